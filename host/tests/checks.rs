@@ -2,6 +2,7 @@
 
 mod bench_campaign;
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use pam_data::muscle_description::MuscleDescription;
@@ -9,6 +10,8 @@ use pam_data::recording::Campaign;
 use pam_diagnose::{Diagnosis, Options, diagnose};
 use pam_fit::bench::BenchName;
 use pam_fit::checks::Checks;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::checks::all;
 use virtual_bench::muscle::Muscle;
@@ -130,4 +133,31 @@ fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     // A bench that is sound leaves the muscle's diagnosis as it was.
     let sound = bench();
     assert!(asked(&sound, read(&sound)).missing.is_empty());
+}
+
+/// Each stay at a weight is off by its own error, as a cell that creeps is: the rows of a stay repeat it.
+#[test]
+fn few_stays_do_not_make_a_sound_load_cell_faulty() {
+    let mut draw = StdRng::seed_from_u64(7);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("dead_weights.csv");
+    let (mut sure, mut outside, checks) = (0, 0, 400);
+    for _ in 0..checks {
+        let mut text = String::from("time_s,force_N,reference_force_N\n");
+        for (stay, weight) in [0.0, 50.0, 100.0, 150.0, 200.0, 100.0, 0.0].into_iter().enumerate() {
+            // Irwin and Hall: the sum of twelve uniform numbers is nearly normal.
+            let error: f64 = (0..12).map(|_| draw.random::<f64>() - 0.5).sum();
+            for row in 0..5 {
+                let _ = writeln!(text, "{},{},{weight}", stay * 5 + row, weight + error);
+            }
+        }
+        std::fs::write(&path, text).expect("written");
+        let measured = Checks::read(&[&path]).expect("a check");
+        let gain = &measured.measured()[0];
+        sure += usize::from(gain.is_sure());
+        outside += usize::from(gain.parameters[0].abs() > gain.half_width(0));
+    }
+    // By the quantile of the normal distribution 3 of these 400 would be faulty.
+    assert_eq!(sure, 0, "sound cells that count as faulty, of {checks}");
+    assert!(outside <= checks / 10, "{outside} of {checks} intervals miss the truth");
 }

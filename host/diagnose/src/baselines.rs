@@ -11,11 +11,16 @@
 mod absorbable;
 mod plan;
 
-use model_core::effects::Context;
+use std::ops::Range;
 
-pub(crate) use self::absorbable::{Absorbable, PriorDeviations, cosine, keeps, projected};
+use model_core::effects::Context;
+use rayon::prelude::*;
+
+pub(crate) use self::absorbable::{Absorbable, PriorDeviations, cosine, keeps, projected, shrink};
 use self::plan::{Part, Plan};
-use super::criteria::baseline::{DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS};
+use super::criteria::baseline::{
+    CACHED_ROWS, DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS, PRODUCT_PART,
+};
 use super::criteria::rows::{NO_LOAD, SLACK_MODEL};
 use super::linear::{Basis, energy, weighted};
 use super::rows::{ORDERS, Rows};
@@ -115,22 +120,42 @@ pub(crate) fn fit(rows: &Rows, kind: Kind, effects: &[Vec<f64>]) -> Baseline {
     fitted
 }
 
-/// One column of a baseline, weighted.
-fn column(rows: &Rows, plan: &Plan, live: &[f64], at: &Iterate, factor: &[f64], part: &Part) -> Vec<f64> {
+/// A weighted column, from the first row that it covers; it is zero on all others.
+type Covering = (usize, Vec<f64>);
+
+/// One column of a baseline.
+fn column(rows: &Rows, plan: &Plan, live: &[f64], at: &Iterate, factor: &[f64], part: &Part) -> Covering {
     let (shapes, contexts, w) = (&rows.shapes, rows.contexts(), rows.root_weight());
     let Iterate { friction, quasi } = at;
-    let of = |value: &dyn Fn(usize) -> f64| (0..rows.len()).map(|i| value(i) * w[i]).collect::<Vec<f64>>();
-    match *part {
-        Part::Deadband => of(&|i| -factor[i] * shapes[i].area),
-        Part::Elastic(k, f) => of(&|i| factor[i] * shapes[i].elastic[k] * plan.functions[f][i]),
-        Part::Yeoh(k) => of(&|i| factor[i] * shapes[i].yeoh[k]),
-        Part::Friction(f) => of(&|i| -live[i] * contexts[i].direction * quasi[i] * plan.functions[f][i]),
-        Part::Area => of(&|i| factor[i] * shapes[i].area * contexts[i].pressure),
-        Part::AreaSlope => of(&|i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
-        Part::Settling => of(&|i| -live[i] * rows.sign[i] * quasi[i] * rows.at_rest().settling[i]),
-        Part::Unsettled | Part::Rest(..) | Part::Ramping => {
-            of(&|i| -live[i] * friction[i] * quasi[i] * part.departure(rows, i))
+    let rubbing = |i: usize| -live[i] * friction[i] * quasi[i];
+    let whole = match *part {
+        Part::Rest(from, to) => {
+            let to = to.min(rows.len());
+            return (from, (from..to).map(|i| rubbing(i) * part.departure(rows, i) * w[i]).collect());
         }
+        Part::Deadband => weighted_rows(w, |i| -factor[i] * shapes[i].area),
+        Part::Elastic(k, f) => weighted_rows(w, |i| factor[i] * shapes[i].elastic[k] * plan.functions[f][i]),
+        Part::Yeoh(k) => weighted_rows(w, |i| factor[i] * shapes[i].yeoh[k]),
+        Part::Friction(f) => {
+            weighted_rows(w, |i| -live[i] * contexts[i].direction * quasi[i] * plan.functions[f][i])
+        }
+        Part::Area => weighted_rows(w, |i| factor[i] * shapes[i].area * contexts[i].pressure),
+        Part::AreaSlope => weighted_rows(w, |i| factor[i] * shapes[i].area_slope * contexts[i].pressure),
+        Part::Settling => {
+            weighted_rows(w, |i| -live[i] * rows.sign[i] * quasi[i] * rows.at_rest().settling[i])
+        }
+        Part::Unsettled | Part::Ramping => weighted_rows(w, |i| rubbing(i) * part.departure(rows, i)),
+    };
+    (0, whole)
+}
+
+/// A value of each row times the root of the row's weight.
+fn weighted_rows(root_weight: &[f64], value: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
+    let weighted = |(i, w): (usize, &f64)| value(i) * w;
+    if root_weight.len() <= PRODUCT_PART {
+        root_weight.iter().enumerate().map(weighted).collect()
+    } else {
+        root_weight.par_iter().enumerate().map(weighted).collect()
     }
 }
 
@@ -140,15 +165,20 @@ fn reach(
     kind: Kind,
     effects: &[Vec<f64>],
     plan: &Plan,
-    column: impl Fn(&Part) -> Vec<f64>,
+    column: impl Fn(&Part) -> Covering,
 ) -> (Absorbable, Basis) {
     let mut joint = Basis::default();
     for part in &plan.hard {
-        joint.push(column(part));
+        let (from, values) = column(part);
+        if values.len() == rows.len() {
+            joint.push(values);
+        } else {
+            joint.push_stretch(from, values, rows.len());
+        }
     }
     let hard = joint.clone();
     for part in &plan.soft {
-        joint.push_beyond(column(part), DISTINCT_DIRECTION);
+        joint.push_beyond(column(part).1, DISTINCT_DIRECTION);
     }
     let soft = joint.columns(hard.rank(), rows.len());
     let of_friction: Vec<bool> = joint.kept()[hard.rank()..]
@@ -233,6 +263,7 @@ fn round(rows: &Rows, kind: Kind, effects: &[Vec<f64>], plan: &Plan, live: &[f64
 }
 
 /// A baseline's forces at every row.
+#[derive(Default)]
 struct Values {
     force: Vec<f64>,
     quasi: Vec<f64>,
@@ -242,59 +273,105 @@ struct Values {
     deadband: f64,
 }
 
+impl Values {
+    fn zeros(n: usize) -> Self {
+        let zeros = || vec![0.0; n];
+        Self {
+            force: zeros(),
+            quasi: zeros(),
+            gaylord: zeros(),
+            friction: zeros(),
+            stiffness: zeros(),
+            deadband: 0.0,
+        }
+    }
+
+    /// Rows that follow these.
+    fn append(&mut self, next: &Self) {
+        self.force.extend(&next.force);
+        self.quasi.extend(&next.quasi);
+        self.gaylord.extend(&next.gaylord);
+        self.friction.extend(&next.friction);
+        self.stiffness.extend(&next.stiffness);
+        self.deadband = next.deadband;
+    }
+}
+
+/// Rows are taken in blocks that stay in the cache while one part after the other is added.
 fn values(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64]) -> Values {
-    let n = rows.len();
-    let mut v = Values {
-        force: vec![0.0; n],
-        quasi: vec![0.0; n],
-        gaylord: vec![0.0; n],
-        friction: vec![0.0; n],
-        stiffness: vec![0.0; n],
-        deadband: 0.0,
+    let blocks: Vec<usize> = (0..rows.len()).step_by(CACHED_ROWS).collect();
+    let of =
+        |from: &usize| values_within(rows, plan, solution, live, *from..(from + CACHED_ROWS).min(rows.len()));
+    let found: Vec<Values> = if rows.len() <= PRODUCT_PART {
+        blocks.iter().map(of).collect()
+    } else {
+        blocks.par_iter().map(of).collect()
     };
+    let mut all = Values::default();
+    found.iter().for_each(|v| all.append(v));
+    all
+}
+
+fn values_within(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64], within: Range<usize>) -> Values {
+    let n = within.len();
+    let mut v = Values::zeros(n);
     let mut settling = 0.0;
     let (mut elastic, mut departure) = (vec![0.0; n], vec![0.0; n]);
+    let (shapes, contexts) = (&rows.shapes[within.clone()], &rows.contexts()[within.clone()]);
     for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
-        if let Part::Deadband = part {
-            v.deadband = *c;
-        }
-        for i in 0..n {
-            let (shape, context) = (&rows.shapes[i], rows.contexts()[i]);
-            match *part {
-                Part::Deadband => {
+        match *part {
+            Part::Deadband => {
+                v.deadband = *c;
+                for (i, shape) in shapes.iter().enumerate() {
                     v.gaylord[i] -= c * shape.area;
                     v.stiffness[i] -= c * shape.area_slope;
                 }
-                Part::Elastic(k, f) => {
-                    elastic[i] += c * plan.functions[f][i] * shape.elastic[k];
-                    v.stiffness[i] += c * plan.functions[f][i] * shape.elastic_slope[k];
+            }
+            Part::Elastic(k, f) => {
+                for (i, (shape, f)) in shapes.iter().zip(&plan.functions[f][within.clone()]).enumerate() {
+                    elastic[i] += c * f * shape.elastic[k];
+                    v.stiffness[i] += c * f * shape.elastic_slope[k];
                 }
-                Part::Yeoh(k) => {
+            }
+            Part::Yeoh(k) => {
+                for (i, shape) in shapes.iter().enumerate() {
                     elastic[i] += c * shape.yeoh[k];
                     v.stiffness[i] += c * shape.yeoh_slope[k];
                 }
-                Part::Friction(f) => v.friction[i] += c * plan.functions[f][i],
-                Part::Area => {
+            }
+            Part::Friction(f) => {
+                v.friction.iter_mut().zip(&plan.functions[f][within.clone()]).for_each(|(v, f)| *v += c * f);
+            }
+            Part::Area => {
+                for (i, (shape, context)) in shapes.iter().zip(contexts).enumerate() {
                     v.gaylord[i] += c * context.pressure * shape.area;
                     v.stiffness[i] += c * context.pressure * shape.area_slope;
                 }
-                Part::AreaSlope => v.gaylord[i] += c * context.pressure * shape.area_slope,
-                Part::Settling => settling = *c,
-                Part::Unsettled | Part::Rest(..) | Part::Ramping => {
-                    departure[i] += c * part.departure(rows, i)
+            }
+            Part::AreaSlope => {
+                for (i, (shape, context)) in shapes.iter().zip(contexts).enumerate() {
+                    v.gaylord[i] += c * context.pressure * shape.area_slope;
                 }
+            }
+            Part::Settling => settling = *c,
+            Part::Rest(from, to) if to <= within.start || from >= within.end => {}
+            Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+                departure
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(i, d)| *d += c * part.departure(rows, within.start + i));
             }
         }
     }
     for i in 0..n {
-        let (shape, context) = (&rows.shapes[i], rows.contexts()[i]);
+        let (shape, context, row) = (&shapes[i], &contexts[i], within.start + i);
         v.gaylord[i] += context.pressure * shape.area;
         v.stiffness[i] += context.pressure * shape.area_slope;
         v.quasi[i] = v.gaylord[i] + elastic[i];
         v.friction[i] = v.friction[i].clamp(FRICTION_LIMITS.0, FRICTION_LIMITS.1);
-        let late = settling * rows.sign[i] * rows.at_rest().settling[i];
+        let late = settling * rows.sign[row] * rows.at_rest().settling[row];
         let direction = context.direction + departure[i];
-        v.force[i] = live[i] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
+        v.force[i] = live[row] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v
 }

@@ -8,7 +8,7 @@ use model_core::effects::MEMORY;
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::Candidate;
 use super::criteria::baseline::TABLE_ORDER;
-use super::criteria::judgement::{CHECK_DEVIATIONS, CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
+use super::criteria::judgement::{CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
 use super::cross_validation::HeldOutRows;
 use super::location::locate;
 use super::rows::{self, Rows};
@@ -25,7 +25,7 @@ struct Judged {
     measured: Measured,
     /// The largest force that it makes at any row, N.
     peak: f64,
-    /// The same two standard deviations further from none, N.
+    /// The same at the end of the 95 % interval that is further from none, N.
     at_most: f64,
 }
 
@@ -56,8 +56,8 @@ impl BenchChecks {
             let further: Vec<f64> = measured
                 .parameters
                 .iter()
-                .zip(&measured.deviations)
-                .map(|(v, std)| v + std.unwrap_or(0.0) * CHECK_DEVIATIONS.copysign(*v))
+                .enumerate()
+                .map(|(at, v)| v + measured.half_width(at).copysign(*v))
                 .collect();
             let judged = Judged {
                 measured: measured.clone(),

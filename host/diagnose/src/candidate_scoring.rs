@@ -3,7 +3,7 @@
 use model_core::effects::Parameter;
 use rayon::prelude::*;
 
-use super::baselines::{Baseline, PriorDeviations, keeps};
+use super::baselines::{Baseline, PriorDeviations, keeps, shrink};
 use super::candidate_fit::CandidateFit;
 use super::candidates::Candidate;
 use super::criteria::candidates::{
@@ -35,10 +35,7 @@ pub(crate) struct Scorer<'a> {
 fn in_metric(base: &Baseline, core: &[f64], prior: PriorDeviations, weight: f64) -> Vec<f64> {
     let keep = keeps(prior, &base.span.of_friction, weight);
     let mut r = core.to_vec();
-    for (q, keep) in base.span.soft.iter().zip(&keep) {
-        let c = dot(q, core);
-        add_scaled(&mut r, -(1.0 - keep * keep) * c, q);
-    }
+    shrink(&mut r, &base.span.soft, |at, along| (keep[at] * keep[at] - 1.0) * along);
     r
 }
 

@@ -16,7 +16,6 @@
 //! | `run_offset` | slips and bad runs |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
 //! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
-//! | `student` | quantiles of Student's t |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
 //! | `enter` | the history beside what the static search says |
@@ -36,7 +35,6 @@ mod run_offset;
 mod shift_fit;
 mod spline;
 mod staircase;
-mod student;
 pub mod table_fit;
 pub mod table_unseen;
 #[cfg(test)]
@@ -45,7 +43,6 @@ mod unseen;
 
 pub use answer::History;
 pub use enter::{diagnose, is_from_history};
-pub(crate) use student::t_quantile;
 
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;

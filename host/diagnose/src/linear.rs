@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::criteria::baseline::{DEPENDENT_COLUMN, PRODUCT_PART};
+use super::criteria::baseline::{CACHED_ROWS, DEPENDENT_COLUMN, PRODUCT_PART};
 use super::criteria::candidates::MOST_AMPLITUDES;
 
 /// Sum of products.
@@ -48,6 +48,69 @@ pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
     }
 }
 
+/// Part of a column: its values from a row on, zero elsewhere.
+#[derive(Clone, Copy)]
+pub(crate) struct Stretch<'a> {
+    from: usize,
+    values: &'a [f64],
+}
+
+impl<'a> Stretch<'a> {
+    /// A whole column.
+    pub(crate) fn whole(values: &'a [f64]) -> Self {
+        Self { from: 0, values }
+    }
+
+    /// The values within `from..to`, and the first row of these.
+    fn within(self, from: usize, to: usize) -> (usize, &'a [f64]) {
+        let begin = from.max(self.from);
+        let end = to.min(self.from + self.values.len());
+        if begin < end { (begin, &self.values[begin - self.from..end - self.from]) } else { (from, &[]) }
+    }
+}
+
+/// Scalar products of `v` with many columns. Rows are taken in blocks that stay in the cache, so that `v` is read from memory once.
+pub(crate) fn products(columns: &[Stretch], v: &[f64]) -> Vec<f64> {
+    let of_part = |part: usize, v: &[f64]| {
+        let mut sums = vec![0.0; columns.len()];
+        let first = part * PRODUCT_PART;
+        for (block, v) in v.chunks(CACHED_ROWS).enumerate() {
+            let from = first + block * CACHED_ROWS;
+            for (sum, column) in sums.iter_mut().zip(columns) {
+                let (begin, values) = column.within(from, from + v.len());
+                *sum += dot_of_part(values, &v[begin - from..begin - from + values.len()]);
+            }
+        }
+        sums
+    };
+    if v.len() <= PRODUCT_PART {
+        return of_part(0, v);
+    }
+    let parts: Vec<Vec<f64>> =
+        v.par_chunks(PRODUCT_PART).enumerate().map(|(part, v)| of_part(part, v)).collect();
+    (0..columns.len()).map(|j| parts.iter().map(|p| p[j]).sum()).collect()
+}
+
+/// `to += Σ factors · columns`, by the same blocks.
+pub(crate) fn add_all(to: &mut [f64], factors: &[f64], columns: &[Stretch]) {
+    let of_part = |part: usize, to: &mut [f64]| {
+        let first = part * PRODUCT_PART;
+        for (block, to) in to.chunks_mut(CACHED_ROWS).enumerate() {
+            let from = first + block * CACHED_ROWS;
+            let end = from + to.len();
+            for (factor, column) in factors.iter().zip(columns) {
+                let (begin, values) = column.within(from, end);
+                to[begin - from..].iter_mut().zip(values).for_each(|(t, f)| *t += factor * f);
+            }
+        }
+    };
+    if to.len() <= PRODUCT_PART {
+        of_part(0, to);
+    } else {
+        to.par_chunks_mut(PRODUCT_PART).enumerate().for_each(|(part, to)| of_part(part, to));
+    }
+}
+
 /// A unit vector that is zero outside a stretch of rows.
 #[derive(Clone, Debug)]
 struct Direction {
@@ -67,15 +130,8 @@ impl Direction {
         }
     }
 
-    fn along(&self, v: &[f64]) -> f64 {
-        dot(&self.values, &v[self.from..self.from + self.values.len()])
-    }
-
-    /// Takes out of `v` what lies along it; gives how much that was.
-    fn out_of(&self, v: &mut [f64]) -> f64 {
-        let c = self.along(v);
-        add_scaled(&mut v[self.from..self.from + self.values.len()], -c, &self.values);
-        c
+    fn stretch(&self) -> Stretch<'_> {
+        Stretch { from: self.from, values: &self.values }
     }
 }
 
@@ -116,7 +172,7 @@ impl Basis {
             return false;
         }
         let mut r = self.coefficients_out(&mut column);
-        // Once more: the first pass leaves what rounding left (Kahan: "twice is enough").
+        // Once more: the first pass leaves what rounding left (classical Gram–Schmidt; Kahan: "twice is enough").
         for (a, b) in r.iter_mut().zip(self.coefficients_out(&mut column)) {
             *a += b;
         }
@@ -132,13 +188,42 @@ impl Basis {
         true
     }
 
+    /// Adds a weighted column that is zero outside a stretch of rows; `rows` is how many all columns have. It costs no more than
+    /// its stretch where no earlier column overlaps it.
+    pub(crate) fn push_stretch(&mut self, from: usize, mut values: Vec<f64>, rows: usize) -> bool {
+        let to = from + values.len();
+        if self.q.iter().any(|q| q.from < to && from < q.from + q.values.len()) {
+            let mut column = vec![0.0; rows];
+            column[from..to].copy_from_slice(&values);
+            return self.push(column);
+        }
+        let index = self.offered;
+        self.offered += 1;
+        let norm = energy(&values).sqrt();
+        if !(norm > 0.0 && norm.is_finite()) {
+            return false;
+        }
+        values.iter_mut().for_each(|v| *v /= norm);
+        let mut r = vec![0.0; self.q.len()];
+        r.push(norm);
+        self.q.push(Direction { from, values });
+        self.r.push(r);
+        self.kept.push(index);
+        true
+    }
+
     /// How many independent columns it has.
     pub(crate) fn rank(&self) -> usize {
         self.q.len()
     }
 
+    /// Takes out of `v` what lies in the basis; gives how much that was along each vector.
     fn coefficients_out(&self, v: &mut [f64]) -> Vec<f64> {
-        self.q.iter().map(|q| q.out_of(v)).collect()
+        let columns: Vec<Stretch> = self.q.iter().map(Direction::stretch).collect();
+        let along = products(&columns, v);
+        let less: Vec<f64> = along.iter().map(|c| -c).collect();
+        add_all(v, &less, &columns);
+        along
     }
 
     /// The orthonormal columns from the `first` on.
@@ -153,7 +238,7 @@ impl Basis {
 
     /// What a weighted column has along each of the orthonormal ones.
     pub(crate) fn along(&self, v: &[f64]) -> Vec<f64> {
-        self.q.iter().map(|q| q.along(v)).collect()
+        products(&self.q.iter().map(Direction::stretch).collect::<Vec<_>>(), v)
     }
 
     /// Which of the columns offered were kept.
@@ -315,6 +400,16 @@ mod tests {
         let ones = vec![1.0; 90];
         for columns in [[&first, &second, &whole], [&whole, &second, &first]] {
             let basis = Basis::new(&columns.map(Vec::clone), &ones);
+            let mut by_stretches = Basis::default();
+            for c in columns {
+                let at = |v: &f64| *v != 0.0;
+                let (from, to) = (c.iter().position(at), c.iter().rposition(at));
+                let (from, to) = (from.expect("not zero"), to.expect("not zero") + 1);
+                assert!(by_stretches.push_stretch(from, c[from..to].to_vec(), 90));
+            }
+            for (a, b) in by_stretches.solve(&y).iter().zip(basis.solve(&y)) {
+                assert!((a - b).abs() < 1e-12);
+            }
             let found = basis.solve(&y);
             let expected = columns.map(|c| {
                 if *c == first {
@@ -334,6 +429,43 @@ mod tests {
             assert!((energy(&along) - energy(&y)).abs() < 1e-9 * energy(&y));
             for (q, c) in basis.columns(0, 90).iter().zip(along) {
                 assert!((energy(q) - 1.0).abs() < 1e-12 && (dot(q, &y) - c).abs() < 1e-9 * energy(&y).sqrt());
+            }
+        }
+    }
+
+    #[test]
+    fn products_by_blocks_are_those_of_whole_columns() {
+        let mut random = Random(5);
+        let n = PRODUCT_PART + 3 * CACHED_ROWS + 17;
+        let column = |random: &mut Random| (0..n).map(|_| random.normal()).collect::<Vec<f64>>();
+        let (a, b, v) = (column(&mut random), column(&mut random), column(&mut random));
+        let (from, to) = (CACHED_ROWS - 3, PRODUCT_PART + 5);
+        let columns = [Stretch::whole(&a), Stretch { from, values: &b[from..to] }];
+        let found = products(&columns, &v);
+        let whole: Vec<f64> = (0..n).map(|i| if (from..to).contains(&i) { b[i] } else { 0.0 }).collect();
+        for (got, want) in found.iter().zip([dot(&a, &v), dot(&whole, &v)]) {
+            assert!((got - want).abs() < 1e-9, "{got} {want}");
+        }
+        let mut sum = v.clone();
+        add_all(&mut sum, &[2.0, -3.0], &columns);
+        for i in 0..n {
+            assert!((sum[i] - (v[i] + 2.0 * a[i] - 3.0 * whole[i])).abs() < 1e-12, "row {i}");
+        }
+    }
+
+    #[test]
+    fn nearly_dependent_columns_make_an_orthonormal_basis() {
+        let n = 3 * CACHED_ROWS;
+        let t: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
+        // Powers of a number between 0 and 1: the ninth differs from the others by a millionth of itself.
+        let columns: Vec<Vec<f64>> = (0..9).map(|k| t.iter().map(|t| t.powi(k)).collect()).collect();
+        let basis = Basis::new(&columns, &vec![1.0; n]);
+        assert_eq!(basis.rank(), 9);
+        let q = basis.columns(0, n);
+        for (i, a) in q.iter().enumerate() {
+            for (j, b) in q.iter().enumerate() {
+                let want = f64::from(u8::from(i == j));
+                assert!((dot(a, b) - want).abs() < 1e-12, "{i} {j}: {}", dot(a, b));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Location of the error: its energy above the noise along every coordinate, with a p-value from shuffled blocks.
 
+use rayon::prelude::*;
+
 use super::criteria::location::{
     BINS, DISCRETE_BINS, MOST_REGIONS, REGION_ALPHA, REGION_ROWS, REGION_SHUFFLES, REGION_SMOOTHING,
     REGION_VARIANCE, SMOOTHED_NOISE, SMOOTHED_NOISE_MOST,
@@ -152,21 +154,22 @@ pub(crate) fn locate(
     for (e, w) in excess.iter_mut().zip(rows.root_weight()) {
         *e = if *w > 0.0 { *e - floor } else { 0.0 };
     }
-    let mut regions = Vec::new();
-    let mut profiles = Vec::new();
     let blocks = block_ranges(rows);
     let steady = (energy(before) / energy(rows.root_weight()).max(1e-12)).sqrt();
-    for c in coordinates(rows) {
-        let edges = edges(&c.values, rows.root_weight(), c.discrete);
-        if edges.len() < 3 {
-            continue;
-        }
-        let binned = Binned::new(rows, &c, edges);
-        profiles.push(binned.profile(rows, &c, before, after));
-        if !(steady < 1e-12) {
-            regions.extend(binned.region(rows, &c, &excess, &blocks, seed));
-        }
-    }
+    let found: Vec<(Option<Region>, Profile)> = coordinates(rows)
+        .par_iter()
+        .filter_map(|c| {
+            let edges = edges(&c.values, rows.root_weight(), c.discrete);
+            if edges.len() < 3 {
+                return None;
+            }
+            let binned = Binned::new(rows, c, edges);
+            let region = if steady < 1e-12 { None } else { binned.region(rows, c, &excess, &blocks, seed) };
+            Some((region, binned.profile(rows, c, before, after)))
+        })
+        .collect();
+    let (regions, profiles): (Vec<Option<Region>>, Vec<Profile>) = found.into_iter().unzip();
+    let mut regions: Vec<Region> = regions.into_iter().flatten().collect();
     let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(REGION_VARIANCE).sqrt();
     regions.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     regions.retain(|r| r.p <= REGION_ALPHA);
@@ -278,7 +281,7 @@ fn names(rows: &Rows, from: f64, to: f64) -> Vec<String> {
     (0..rows.names.len()).filter(within).map(|i| rows.names[i].clone()).collect()
 }
 
-/// Values with whole blocks in another order, each reversed in itself: both what belongs to a block and what belongs to a place
+/// Values with whole blocks in another order, each rotated in itself: both what belongs to a block and what belongs to a place
 /// within it are torn from the coordinate, while the residual's own correlation stays.
 pub(crate) fn shuffled(values: &[f64], blocks: &[(usize, usize)], random: &mut Random) -> Vec<f64> {
     let mut order: Vec<usize> = (0..blocks.len()).collect();
@@ -289,7 +292,8 @@ pub(crate) fn shuffled(values: &[f64], blocks: &[(usize, usize)], random: &mut R
     for o in order {
         let (from, until) = blocks[o];
         let shift = random.below(until - from);
-        shuffled.extend((0..until - from).map(|k| values[from + (k + shift) % (until - from)]));
+        shuffled.extend_from_slice(&values[from + shift..until]);
+        shuffled.extend_from_slice(&values[from..from + shift]);
     }
     shuffled
 }

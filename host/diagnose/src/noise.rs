@@ -2,9 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
 use super::criteria::noise::{
-    CORRELATION_END, FEWEST_REPEATS, INSTRUMENT_MEMORY, INSTRUMENT_NOISE, LAG_GROWTH, LATER_REPEATS,
-    LONGEST_LAG, REPEAT_BINS, REPEAT_OUTLIERS, REPEAT_PRESSURE_BINS, REPEAT_SPEED_BINS, SAME_LENGTH,
+    CORRELATION_END, FAMILY_PART, FEWEST_REPEATS, INSTRUMENT_MEMORY, INSTRUMENT_NOISE, LAG_GROWTH,
+    LATER_REPEATS, LONGEST_LAG, REPEAT_BINS, REPEAT_OUTLIERS, REPEAT_PRESSURE_BINS, REPEAT_SPEED_BINS,
+    SAME_LENGTH,
 };
 use super::linear::{Random, energy};
 use super::remark::Scatter;
@@ -177,12 +181,33 @@ pub(crate) fn estimate(rows: &Rows, residual: &[f64], step: f64) -> Noise {
     Noise { sigma, from_repeats: repeats.is_some(), memory, independent }
 }
 
+/// The largest statistic of each throw of all blocks' signs.
+fn largest_of_family(scores: &[&[f64]], inverse: &[f64], throws: usize, random: &mut Random) -> Vec<f64> {
+    let blocks = scores.first().map_or(0, |s| s.len());
+    // Statistics times throws are a product of matrices, of which both stay in the cache part by part.
+    let families: Vec<DMatrix<f64>> = scores
+        .chunks(FAMILY_PART)
+        .zip(inverse.chunks(FAMILY_PART))
+        .map(|(scores, inverse)| DMatrix::from_fn(scores.len(), blocks, |j, b| scores[j][b] * inverse[j]))
+        .collect();
+    let mut largest = Vec::with_capacity(throws);
+    while largest.len() < throws {
+        let many = FAMILY_PART.min(throws - largest.len());
+        let signs = DMatrix::from_fn(blocks, many, |_, _| if random.next() & 1 == 0 { 1.0 } else { -1.0 });
+        let tops: Vec<Vec<f64>> = families
+            .par_iter()
+            .map(|family| (family * &signs).column_iter().map(|c| c.amax()).collect())
+            .collect();
+        largest.extend((0..many).map(|t| tops.iter().map(|tops| tops[t]).fold(0.0, f64::max)));
+    }
+    largest
+}
+
 /// The frequency with which the largest of many statistics (sums over blocks, divided by their scatter) exceeds each observed one
 /// when the sign of every block is thrown by a coin: p-values that hold for the whole family.
 ///
 /// `scores[j][b]` is statistic `j`'s share from block `b`. Blocks stay whole, so correlation within them does not matter.
 pub(crate) fn family_p(scores: &[&[f64]], throws: usize, seed: u64) -> Vec<f64> {
-    let blocks = scores.first().map_or(0, |s| s.len());
     let inverse: Vec<f64> = scores
         .iter()
         .map(|s| {
@@ -192,20 +217,7 @@ pub(crate) fn family_p(scores: &[&[f64]], throws: usize, seed: u64) -> Vec<f64> 
         .collect();
     let observed: Vec<f64> =
         scores.iter().zip(&inverse).map(|(s, i)| s.iter().sum::<f64>().abs() * i).collect();
-    let mut random = Random(seed);
-    let mut largest = Vec::with_capacity(throws);
-    let mut signs = vec![1.0; blocks];
-    for _ in 0..throws {
-        for s in &mut signs {
-            *s = if random.next() & 1 == 0 { 1.0 } else { -1.0 };
-        }
-        let top = scores
-            .iter()
-            .zip(&inverse)
-            .map(|(s, i)| super::linear::dot(s, &signs).abs() * i)
-            .fold(0.0, f64::max);
-        largest.push(top);
-    }
+    let largest = largest_of_family(scores, &inverse, throws, &mut Random(seed));
     observed
         .iter()
         .map(|o| {

@@ -7,12 +7,13 @@
 use model_core::braid::Braid;
 use model_core::units::Length;
 use pam_data::error::Result;
+use pam_fit::numerics::student::half_width_95;
 use pam_fit::stock::{Law, LawError, Member, Place, Stock, Value, stock};
 
 use crate::criteria::stock::{EXCHANGEABLE, ONSET, ONSET_STEPS, PLACES, SLOPE_RANGE};
 use crate::criteria::uncertainty::NORMAL_95;
 use crate::history::answer::{Estimate, FindingKind};
-use crate::history::{history, t_quantile};
+use crate::history::history;
 
 /// An estimate with its standard error and its 95 % interval, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,7 +162,7 @@ fn named(fitted: &Stock, freedom: usize) -> Option<(Law, Interval, f64)> {
     let tried = fitted.tried.iter().find(|t| t.laws == fitted.laws)?;
     let value = *tried.values.first()?;
     let t = value.value / value.std;
-    (t > t_quantile(freedom)).then(|| (*law, Interval::new(value, t_quantile(freedom)), t))
+    (t > half_width_95(freedom)).then(|| (*law, Interval::new(value, half_width_95(freedom)), t))
 }
 
 fn confusable(fitted: &Stock, law: Law) -> Vec<String> {
@@ -186,11 +187,11 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
             "its parameter would be negative".to_owned()
         } else if !(t.error < none) {
             "it does not predict left-out muscles better than chance differences".to_owned()
-        } else if !(value.value > t_quantile(freedom) * value.std) {
+        } else if !(value.value > half_width_95(freedom) * value.std) {
             format!(
                 "its parameter is {:.1} standard errors from zero, {:.1} are needed",
                 value.value / value.std,
-                t_quantile(freedom)
+                half_width_95(freedom)
             )
         } else {
             "another law predicts left-out muscles better".to_owned()
@@ -203,7 +204,7 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
             let law = t.laws.first().copied();
             Considered {
                 law,
-                parameter: t.values.first().map(|v| Interval::new(*v, t_quantile(freedom))),
+                parameter: t.values.first().map(|v| Interval::new(*v, half_width_95(freedom))),
                 jackknife: t.jackknife.first().copied(),
                 error: t.error,
                 why_not: why(t, law),
@@ -295,5 +296,5 @@ fn pooled(muscles: &[MuscleOwn]) -> Option<(Interval, usize)> {
     let mean = values.iter().sum::<f64>() / n as f64;
     let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
     let std = (square / (n - 1) as f64 / n as f64).sqrt();
-    Some((Interval::new(Value { value: mean, std }, t_quantile(n - 1)), n))
+    Some((Interval::new(Value { value: mean, std }, half_width_95(n - 1)), n))
 }

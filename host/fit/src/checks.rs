@@ -25,6 +25,7 @@ mod table;
 use std::path::Path;
 
 use crate::bench::BenchName;
+use crate::numerics::student::{effective_freedom, half_width};
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Quantity};
 
@@ -70,6 +71,8 @@ pub struct Measured {
     pub parameters: Vec<f64>,
     /// Their standard deviations (1 σ), by whole stays or stretches; `None` for what the check does not vary.
     pub deviations: Vec<Option<f64>>,
+    /// Degrees of freedom of the deviations.
+    pub freedom: f64,
     /// The first parameter with its 95 % interval, as text with practical units.
     pub words: String,
     /// Which check measured it, as text.
@@ -82,12 +85,25 @@ impl Measured {
     pub fn is_sure(&self) -> bool {
         let mut varied =
             self.parameters.iter().zip(&self.deviations).filter_map(|(v, std)| Some((v, (*std)?)));
-        varied.next().is_some_and(|(value, std)| value.abs() > SURE * std)
+        varied.next().is_some_and(|(value, std)| value.abs() > half_width(CHANCE, self.freedom) * std)
+    }
+
+    /// The largest and smallest value of a parameter that the check allows, as a distance from its value (95 %).
+    #[must_use]
+    pub fn half_width(&self, at: usize) -> f64 {
+        self.deviations
+            .get(at)
+            .copied()
+            .flatten()
+            .map_or(0.0, |std| half_width(CONFIDENCE_MISS, self.freedom) * std)
     }
 }
 
-/// Significance: a fault counts as real from this many standard deviations on (p < 10⁻⁴ for normal errors, in any of the few checks).
-const SURE: f64 = 4.0;
+/// The probability that chance alone makes a fault that counts as real; a bench has few checks. Student's t by the number of stays:
+/// four standard deviations are enough only where there are very many, six where there are ten more stays than unknowns.
+const CHANCE: f64 = 6.3e-5;
+/// The probability that an interval misses the truth.
+const CONFIDENCE_MISS: f64 = 0.05;
 
 /// Checks of one bench.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -159,8 +175,33 @@ pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
     freed
 }
 
-/// The standard deviation of a measurement whose reference may be off by up to `limit`, every error within it being equally likely
-/// (JCGM 100:2008, 4.3.7).
-fn with_reference(deviation: f64, limit: f64) -> f64 {
-    deviation.hypot(limit / 3.0_f64.sqrt())
+/// The standard deviation of a measurement, with its degrees of freedom.
+#[derive(Clone, Copy)]
+struct Uncertainty {
+    deviation: f64,
+    freedom: f64,
+}
+
+impl Uncertainty {
+    /// Of repeated readings, whose reference may be off by up to `limit`, every error within it being equally likely
+    /// (JCGM 100:2008, 4.3.7).
+    fn with_reference(deviation: f64, freedom: usize, limit: f64) -> Self {
+        let reference = limit / 3.0_f64.sqrt();
+        let variances = [(deviation * deviation, freedom as f64), (reference * reference, f64::INFINITY)];
+        Self { deviation: deviation.hypot(reference), freedom: effective_freedom(&variances) }
+    }
+
+    /// Of repeated readings alone.
+    fn of(deviation: f64, freedom: usize) -> Self {
+        Self { deviation, freedom: freedom as f64 }
+    }
+
+    fn scaled(self, factor: f64) -> Self {
+        Self { deviation: self.deviation * factor.abs(), ..self }
+    }
+
+    /// Half of the 95 % interval.
+    fn half_width(self) -> f64 {
+        half_width(CONFIDENCE_MISS, self.freedom) * self.deviation
+    }
 }

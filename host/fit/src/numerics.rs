@@ -2,6 +2,7 @@
 //!
 //! | module | method |
 //! | --- | --- |
+//! | [`student`] | quantiles of Student's t |
 //! | [`symmetric`] | dense symmetric matrices, Cholesky factorisation with dropped pivots, the scalar product |
 //! | [`least_squares`] | small least-squares problems by QR and SVD, and normal equations by blocks with jackknife deviations |
 //! | [`jackknife`] | variances from estimates with one block left out in turn |
@@ -10,7 +11,7 @@
 //! | [`finite_difference`] | central differences |
 //! | [`median`], [`quantile`], [`ranked`] | order statistics |
 //!
-//! nalgebra provides QR, SVD, eigenvectors and the Cholesky factorisation of small full-rank systems. [`symmetric`] is a
+//! statrs provides the distributions, nalgebra QR, SVD, eigenvectors and the Cholesky factorisation of small full-rank systems. [`symmetric`] is a
 //! factorisation of its own because a fit has unknowns that the data do not determine: nalgebra's fails at such a pivot, this one
 //! leaves the unknown at zero and counts it.
 //!
@@ -34,6 +35,7 @@ pub mod finite_difference;
 pub mod jackknife;
 pub mod least_squares;
 pub mod spline_basis;
+pub mod student;
 pub mod symmetric;
 
 pub use pam_data::statistics::{median, quantile, ranked};

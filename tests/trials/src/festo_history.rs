@@ -1,6 +1,7 @@
 //! The section of festo.md on the memory of the bladder: errors of held-out runs with and without memory, the documented findings by muscle
 //! and pooled over each set, and the end effect over the lengths.
 
+use pam_fit::numerics::student::half_width_95;
 use serde_json::Value;
 use std::fmt::Write as _;
 
@@ -37,19 +38,6 @@ fn finding<'a>(history: &'a Value, kind: &str) -> Option<&'a Value> {
 
 fn found(history: &Value, kind: &str) -> bool {
     finding(history, kind).and_then(|f| f.get("found")).and_then(Value::as_bool) == Some(true)
-}
-
-/// 97.5 % quantile of Student's t.
-fn t_quantile(freedom: usize) -> f64 {
-    const TABLE: [f64; 20] = [
-        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145,
-        2.131, 2.120, 2.110, 2.101, 2.093, 2.086,
-    ];
-    match freedom {
-        0 => f64::INFINITY,
-        1..=20 => TABLE[freedom - 1],
-        _ => 1.96 + 2.4 / freedom as f64,
-    }
 }
 
 /// First paragraph of the section, and the head of its table.
@@ -127,7 +115,7 @@ fn documented(text: &mut String, answers: &[MuscleAnswer<'_>]) {
             let (deviation, freedom) = pool(answers, t.year, kind)?;
             let f = finding(h, kind)?;
             let (value, units) = (number(f, &["size", "value"])?, number(f, &["units"])?);
-            let half = t_quantile(freedom) * deviation / units.sqrt();
+            let half = half_width_95(freedom) * deviation / units.sqrt();
             Some((value, half))
         };
         let by_pool = |kind: &str| pooled(kind).map_or("–".into(), |(v, h)| format!("{v:.1} ± {h:.1}"));
@@ -222,7 +210,7 @@ fn end_effect(text: &mut String, answers: &[MuscleAnswer<'_>]) {
             "| {year} | {n} | {:.1} ± {:.1} | {t:.1} | {} |",
             -slope / whole,
             error / whole,
-            if t > t_quantile(n - 2) { "yes" } else { "no" }
+            if t > half_width_95(n - 2) { "yes" } else { "no" }
         );
     }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::criteria::baseline::{FREE_DEVIATION, FREE_ROW};
-use crate::linear::{Basis, add_scaled, dot, energy, weighted};
+use crate::linear::{Basis, Stretch, add_all, dot, energy, products, weighted};
 
 /// How much one bladder may differ between pressures, and how unsure a row is: what a soft baseline takes for granted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,16 +57,28 @@ impl Absorbable {
     /// The same without the effects.
     pub(super) fn whiten(&self, v: &mut [f64]) {
         self.hard.project_out(v);
-        for (q, keep) in self.soft.iter().zip(&self.keep) {
-            let c = dot(q, v);
-            add_scaled(v, -(1.0 - keep) * c, q);
+        if !self.keep.is_empty() {
+            shrink(v, &self.soft, |at, along| (self.keep[at] - 1.0) * along);
         }
     }
 
     /// A column's components along the soft directions.
     pub(crate) fn components(&self, v: &[f64]) -> Vec<f64> {
-        self.soft.iter().map(|q| dot(q, v)).collect()
+        products(&stretches(&self.soft), v)
     }
+}
+
+fn stretches(columns: &[Vec<f64>]) -> Vec<Stretch<'_>> {
+    columns.iter().map(|c| Stretch::whole(c)).collect()
+}
+
+/// Adds to `v` a share of what it has along each of some orthonormal columns: `by` gives how much, of the column's number and
+/// the product.
+pub(crate) fn shrink(v: &mut [f64], orthonormal: &[Vec<f64>], by: impl Fn(usize, f64) -> f64) {
+    let columns = stretches(orthonormal);
+    let factors: Vec<f64> =
+        products(&columns, v).into_iter().enumerate().map(|(at, along)| by(at, along)).collect();
+    add_all(v, &factors, &columns);
 }
 
 /// Every column weighted and freed of what a baseline expresses.

@@ -14,6 +14,8 @@ pam_data::criteria! {
     DEPENDENT_COLUMN: f64 = 1e-7, "d_hard", "1", Derived("the square root of the rounding error of a sum over 24 000 rows");
     /// Rows of a part of a product that threads share. The parts do not depend on the number of threads, so the sum does not either.
     PRODUCT_PART: usize = 65536, "n_part", "1", Cost;
+    /// Rows of a block of many products: a column's block stays in the first-level cache (16 KiB) while all others pass it.
+    CACHED_ROWS: usize = 2048, "n_block", "1", Cost;
     /// Rounds of linearising the friction: first fit, and from an earlier fit.
     LINEARISATIONS: ((usize, usize)) = (4, 3), "n_lin", "1", Judgement;
     /// Friction coefficients are kept within these limits while iterating.

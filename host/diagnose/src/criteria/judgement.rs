@@ -36,8 +36,6 @@ pam_data::criteria! {
     MATERIAL_FAULT: f64 = 2.5e-3, "F_fault/F_b", "1", Measured("data sheets of good instruments allow as much");
     /// Probability of a name that a check of the bench measured.
     CHECKED_PROBABILITY: f64 = 0.99, "p_check", "1", Judgement;
-    /// Standard deviations by which the largest size of a checked fault lies beyond its value.
-    CHECK_DEVIATIONS: f64 = 2.0, "z_check", "1", Convention("95 % of a normal error");
     /// Share of the error below which the effect of checks on it is not resolved.
     CHECK_RESOLUTION: f64 = 1e-3, "q_check", "1", Judgement;
     /// Standard deviations at which an effect would be detected.

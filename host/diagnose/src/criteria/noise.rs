@@ -26,4 +26,6 @@ pam_data::criteria! {
     LAG_GROWTH: f64 = 1.4, "f_lag", "1", Cost;
     /// The longest lag is one of this many parts of the rows.
     LONGEST_LAG: usize = 3, "N/lag", "1", Convention("a third of the series");
+    /// Statistics, and throws of signs, whose products are taken together.
+    FAMILY_PART: usize = 64, "n_family", "1", Cost;
 }

@@ -5,7 +5,7 @@
 use super::campaign::Points;
 use super::criteria::{NEIGHBOURS, PULLS, SHORTENED};
 use super::shift_fit::knot_step;
-use super::student::t_quantile;
+use pam_fit::numerics::student::half_width_95;
 
 /// A mean over independent units with the half-width of its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,8 @@ impl Contrast {
         let mean = mean(&finite)?;
         let squares = finite.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
         let freedom = n.saturating_sub(1);
-        let half = (freedom > 0).then(|| t_quantile(freedom) * (squares / freedom as f64 / n as f64).sqrt());
+        let half =
+            (freedom > 0).then(|| half_width_95(freedom) * (squares / freedom as f64 / n as f64).sqrt());
         Some(Self { mean, half, units: n, squares })
     }
 

@@ -10,9 +10,9 @@ use super::criteria::{JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAS
 use super::findings::{self, Contrast, Visits};
 use super::law::Law;
 use super::shift_fit::knot_step;
-use super::student::t_quantile;
 use super::unseen::{Sizes, Unseen};
 use pam_data::recording::Campaign;
+use pam_fit::numerics::student::half_width_95;
 
 /// Share by which the squared error falls.
 fn gain(before: Sizes, after: Sizes) -> f64 {
@@ -23,7 +23,7 @@ fn gain(before: Sizes, after: Sizes) -> f64 {
 pub(super) fn answer(points: &Points, fits: &Fits<'_>, campaign: &Campaign, rest_length: f64) -> History {
     let (law, unseen) = fits.best();
     let share = unseen.standard_error(|l| l.fit.theta[0]);
-    let quantile = t_quantile(unseen.folds.len().saturating_sub(1));
+    let quantile = half_width_95(unseen.folds.len().saturating_sub(1));
     let unseen_runs = unseen_runs(points, fits);
     let why_not = why_not(points, fits, law, quantile * share);
     let named = why_not.is_empty();
@@ -167,7 +167,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
     found.extend(gap(points, fits, visits, named));
     found.extend(fits.events.iter().map(|e| {
         let length = 1e3 * points.mountings[e.mounting].stroke;
-        let half = if e.lasts { t_quantile(fits.memory.folds.len().saturating_sub(1)) * e.error } else { 2.0 * e.error };
+        let half = if e.lasts { half_width_95(fits.memory.folds.len().saturating_sub(1)) * e.error } else { 2.0 * e.error };
         Finding {
             kind: if e.lasts { FindingKind::Slip } else { FindingKind::BadRun },
             found: e.sure,

@@ -12,9 +12,9 @@ use super::criteria::{
 use super::law::{Law, Layer};
 use super::shift_fit;
 use super::spline::{Banded, Spline};
-use super::student::t_quantile;
 use super::unseen::{jackknife, shifted_curves};
 use pam_fit::numerics::median;
+use pam_fit::numerics::student::half_width_95;
 
 /// What happened to a run, or from a run on.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,7 +161,7 @@ fn slip(layer: &Layer<'_>, law: &Law, mounting: usize, offsets: &[f64]) -> Optio
     let error = jackknife(&steps);
     let here = |i: usize| points.mounting[i] == mounting;
     let (before, after) = (plain.sizes(points, here).rms, stepped.sizes(points, here).rms);
-    let likely = shift.abs() > t_quantile(steps.len().saturating_sub(1)) * error
+    let likely = shift.abs() > half_width_95(steps.len().saturating_sub(1)) * error
         && after <= (1.0 - SLIP_GAIN) * before;
     let sure = shift.abs() > SLIP_ERRORS * error;
     likely.then_some(Event { mounting, run, lasts: true, shift, error, sure })

@@ -1,7 +1,7 @@
 //! Known weights on the load cell: its scale, and what the line's pressure adds to it.
 
 use super::table::{Table, stays};
-use super::{Measured, with_reference};
+use super::{Measured, Uncertainty};
 use crate::bench::BenchName;
 use crate::numerics::least_squares::by_blocks;
 use pam_data::error::Result;
@@ -42,23 +42,34 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         ));
     };
     let gain = found.values[0];
-    let gain_std = with_reference(found.deviations[0], WEIGHT_ERROR * (1.0 + gain));
+    let uncertain =
+        Uncertainty::with_reference(found.deviations[0], found.freedom, WEIGHT_ERROR * (1.0 + gain));
     let mut measured = vec![Measured {
         fault: BenchName::ForceGain,
         parameters: vec![gain, 0.0],
-        deviations: vec![Some(gain_std), None],
-        words: format!("the cell reads {:+.2} ± {:.2} % of the load", 100.0 * gain, 200.0 * gain_std),
+        deviations: vec![Some(uncertain.deviation), None],
+        freedom: uncertain.freedom,
+        words: format!(
+            "the cell reads {:+.2} ± {:.2} % of the load",
+            100.0 * gain,
+            100.0 * uncertain.half_width()
+        ),
         check: CHECK,
     }];
     if pressure.is_some() {
         // F = (1 + γ)(W + c P) + o
         let thrust = found.values[2] / (1.0 + gain);
-        let std = found.deviations[2] / (1.0 + gain);
+        let uncertain = Uncertainty::of(found.deviations[2] / (1.0 + gain), found.freedom);
         measured.push(Measured {
             fault: BenchName::CrossTalk,
             parameters: vec![thrust],
-            deviations: vec![Some(std)],
-            words: format!("the line pushes with {:+.3} ± {:.3} N per 100 kPa", 1e5 * thrust, 2e5 * std),
+            deviations: vec![Some(uncertain.deviation)],
+            freedom: uncertain.freedom,
+            words: format!(
+                "the line pushes with {:+.3} ± {:.3} N per 100 kPa",
+                1e5 * thrust,
+                1e5 * uncertain.half_width()
+            ),
             check: CHECK,
         });
     }

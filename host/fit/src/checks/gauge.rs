@@ -1,7 +1,7 @@
 //! A reference gauge beside the bench's own: its scale. Its zero is a part of the dead band in every model, and stays there.
 
 use super::table::{Table, stays};
-use super::{Measured, with_reference};
+use super::{Measured, Uncertainty};
 use crate::bench::BenchName;
 use crate::numerics::least_squares::by_blocks;
 use pam_data::error::Result;
@@ -22,15 +22,17 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     };
     // The law counts what is missing: the muscle has (1 + γ) of what is read.
     let missing = 1.0 / (1.0 + found.values[0]) - 1.0;
-    let std = with_reference(found.deviations[0], REFERENCE_ERROR) / (1.0 + found.values[0]).powi(2);
+    let uncertain = Uncertainty::with_reference(found.deviations[0], found.freedom, REFERENCE_ERROR)
+        .scaled((1.0 + found.values[0]).powi(-2));
     Ok(vec![Measured {
         fault: BenchName::GaugeGain,
         parameters: vec![missing, 0.0],
-        deviations: vec![Some(std), None],
+        deviations: vec![Some(uncertain.deviation), None],
+        freedom: uncertain.freedom,
         words: format!(
             "the muscle has {:+.2} ± {:.2} % of what the gauge reads",
             100.0 * missing,
-            200.0 * std
+            100.0 * uncertain.half_width()
         ),
         check: "a reference gauge beside the bench's",
     }])

@@ -1,7 +1,7 @@
 //! A bar that does not give, in the muscle's place: what is read as stroke is what frame and joints give.
 
-use super::Measured;
 use super::table::Table;
+use super::{Measured, Uncertainty};
 use crate::bench::BenchName;
 use crate::numerics::least_squares::by_blocks;
 use pam_data::error::Result;
@@ -34,31 +34,47 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
             "the force on the bar changes too little: pull and push it slowly, up to the muscle's force",
         ));
     };
-    let (give, give_std) = (found.values[0].max(0.0), found.deviations[0]);
+    let uncertain = |at: usize| Uncertainty::of(found.deviations[at], found.freedom);
+    let (give, give_known) = (found.values[0].max(0.0), uncertain(0));
     let mut measured = vec![Measured {
         fault: BenchName::RigCompliance,
         // The compliance under load is also the compliance at the reversals.
         parameters: vec![give, give],
-        deviations: vec![Some(give_std), None],
-        words: format!("the frame gives {:.2} ± {:.2} µm per newton", 1e6 * found.values[0], 2e6 * give_std),
+        deviations: vec![Some(give_known.deviation), None],
+        freedom: give_known.freedom,
+        words: format!(
+            "the frame gives {:.2} ± {:.2} µm per newton",
+            1e6 * found.values[0],
+            1e6 * give_known.half_width()
+        ),
         check: CHECK,
     }];
-    let (zero, zero_std) = (found.values[1], found.deviations[1]);
+    let (zero, zero_known) = (found.values[1], uncertain(1));
     if both {
-        let (play, play_std) = (found.values[2].max(0.0), found.deviations[2]);
+        let (play, play_known) = (found.values[2].max(0.0), uncertain(2));
         measured.push(Measured {
             fault: BenchName::Backlash,
             // How softly a braid is taken along behind the play a bar does not show.
             parameters: vec![1.0, play, 0.1],
-            deviations: vec![None, Some(play_std), None],
-            words: format!("the joint has a play of {:.3} ± {:.3} mm", 1e3 * found.values[2], 2e3 * play_std),
+            deviations: vec![None, Some(play_known.deviation), None],
+            freedom: play_known.freedom,
+            words: format!(
+                "the joint has a play of {:.3} ± {:.3} mm",
+                1e3 * found.values[2],
+                1e3 * play_known.half_width()
+            ),
             check: CHECK,
         });
         measured.push(Measured {
             fault: BenchName::DisplacementOffset,
             parameters: vec![zero],
-            deviations: vec![Some(zero_std)],
-            words: format!("the stroke reads {:+.3} ± {:.3} mm too little", 1e3 * zero, 2e3 * zero_std),
+            deviations: vec![Some(zero_known.deviation)],
+            freedom: zero_known.freedom,
+            words: format!(
+                "the stroke reads {:+.3} ± {:.3} mm too little",
+                1e3 * zero,
+                1e3 * zero_known.half_width()
+            ),
             check: CHECK,
         });
     }

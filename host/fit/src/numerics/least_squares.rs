@@ -58,6 +58,8 @@ pub struct BlockSolution {
     pub values: Vec<f64>,
     /// Their standard deviations.
     pub deviations: Vec<f64>,
+    /// Degrees of freedom of these deviations: blocks beyond the columns.
+    pub freedom: usize,
 }
 
 /// Normal equations of some rows.
@@ -112,6 +114,7 @@ pub fn by_blocks(columns: &[Vec<f64>], y: &[f64], block: &[usize]) -> Option<Blo
     Some(BlockSolution {
         values: (0..k).map(|j| solution[j] / sizes[j]).collect(),
         deviations: (0..k).map(|j| variances[j].sqrt() / sizes[j]).collect(),
+        freedom: blocks.len() - k,
     })
 }
 
