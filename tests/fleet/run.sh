@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Runs the workflow of examples/fleet with Snakemake on this machine, its dry run on Slurm, and the queries of the book's page on fleets.
+# Runs the workflow of examples/fleet with Snakemake on this machine, its dry run on Slurm, the queries of the book's page on fleets, and a batch
+# in a bucket of an S3 server on this machine.
 #
-#     bash tests/fleet/run.sh [FOLDER]      FOLDER holds the programs `host` and `virtual-bench`; by default they are built
+#     bash tests/fleet/run.sh [FOLDER]      FOLDER holds the programs `host` and `virtual-bench`; by default they are built,
+#                                           with the feature `buckets`; programs without it skip the test of the bucket
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
@@ -23,9 +25,10 @@ if [ -z "$python" ]; then
 fi
 programs=${1:-}
 if [ -z "$programs" ]; then
-    (cd "$root" && cargo build --quiet --locked --package host --package virtual-bench)
+    (cd "$root" && cargo build --quiet --locked --package host --package virtual-bench --features host/buckets)
     programs=${CARGO_TARGET_DIR:-$root/target}/debug
 fi
+programs=$(cd "$programs" && pwd)
 export PATH="$programs:$(dirname "$python"):$PATH" XDG_CACHE_HOME="$work/cache"
 
 cp -r "$root/examples/fleet" "$work/fleet"
@@ -49,3 +52,8 @@ snakemake --profile profiles/slurm --dry-run --forceall > slurm.log 2>&1 || { ca
 grep -Eq "^shard +4" slurm.log
 "$python" "$here/queries.py" "$root/docs/src/fleets.md"
 echo "fleet: workflow, dry run on Slurm and queries of the book: 3 passed, 0 failed"
+if host batch s3://nowhere/fleet.csv -o "$work/none" 2>&1 | grep -q "without buckets"; then
+    echo "tests/fleet/run.sh: skipped: a batch in a bucket: $programs/host was built without the feature \`buckets\`" >&2
+else
+    "$python" "$here/buckets.py" "$programs/host" "$programs/virtual-bench"
+fi

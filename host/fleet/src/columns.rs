@@ -224,14 +224,14 @@ impl Columns {
 }
 
 /// A value of the footer of a Parquet file.
-pub(crate) fn footer(file: std::fs::File, key: &str) -> Option<String> {
+pub(crate) fn footer(file: impl ChunkReader + 'static, key: &str) -> Option<String> {
     let reader = SerializedFileReader::new(file).ok()?;
     let pairs = reader.metadata().file_metadata().key_value_metadata()?;
     pairs.iter().find(|p| p.key == key)?.value.clone()
 }
 
 /// The number of rows of a Parquet file; 0 where it cannot be read.
-pub(crate) fn rows(file: std::fs::File) -> i64 {
+pub(crate) fn rows(file: impl ChunkReader + 'static) -> i64 {
     SerializedFileReader::new(file).map_or(0, |r| r.metadata().file_metadata().num_rows())
 }
 

@@ -6,6 +6,7 @@
 //! | every muscle computed once, in parallel | [`batch`], [`shard`] |
 //! | results: four Parquet tables per muscle, whole or not at all | [`columns`], [`partition`], [`failures`] |
 //! | all results as one fleet: outlying muscles, groups that differ, a page | [`fleet`], [`robust`], [`groups`], [`overview`], [`page`] |
+//! | the same with manifests, recordings and results in buckets | `storage`, `objects` |
 //! | a table for a muscle with few recordings, from its kin | [`stock`] |
 //!
 //! It imports recordings, fits, diagnoses and reports, and knows no command line.
@@ -26,6 +27,8 @@ pub mod stock;
 pub mod work_item;
 
 mod analysis;
+mod objects;
 mod results;
+mod storage;
 
 pub use shard::Shard;

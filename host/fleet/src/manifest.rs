@@ -11,20 +11,21 @@
 //! | `tags` | `key=value` pairs, separated by `;` |
 //! | any other | a tag with the column's name |
 //!
-//! Paths are relative to the folder of the manifest. In a Parquet manifest `files` and `reference` may be lists of texts.
+//! Paths are relative to the folder of the manifest; the manifest and each file may be an object in a bucket. In a Parquet manifest `files` and `reference` may be lists of texts.
 
 mod parquet;
 mod text;
 
 use std::collections::{BTreeMap, HashSet};
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use pam_data::error::{Error, Result, nearest};
 use sha2::{Digest, Sha256};
 
 use crate::error::FleetCode;
+use crate::storage::{self, is_remote};
 use crate::work_item::WorkItem;
 
 /// The separator of several values in one cell.
@@ -69,6 +70,8 @@ pub struct Manifest {
     rows: Box<dyn Iterator<Item = (u64, Result<Row>)> + Send>,
     /// Hashes of the names that were seen: 16 bytes per muscle.
     seen: HashSet<[u8; 16]>,
+    /// A copy of a manifest from a bucket.
+    _copy: Option<tempfile::TempPath>,
 }
 
 impl std::fmt::Debug for Manifest {
@@ -83,16 +86,35 @@ impl Manifest {
     /// # Errors
     /// A file that cannot be read, or lacks a required column.
     pub fn open(path: &Path) -> Result<Self> {
+        let address = path.to_string_lossy();
+        if !is_remote(&address) {
+            let path = Path::new(address.strip_prefix("file://").unwrap_or(&address));
+            return Self::open_copy(path, path, None);
+        }
+        let bytes = storage::read_existing(&address)?;
+        let copy = |bytes: &[u8]| {
+            let mut file = tempfile::NamedTempFile::new()?;
+            file.write_all(bytes)?;
+            Ok(file.into_temp_path())
+        };
+        let copy = copy(&bytes).map_err(|e: std::io::Error| Error::unwritable(path, &e))?;
+        let local = copy.to_path_buf();
+        Self::open_copy(path, &local, Some(copy))
+    }
+
+    /// Opens a file that is read in the place of the manifest `named`.
+    fn open_copy(named: &Path, path: &Path, copy: Option<tempfile::TempPath>) -> Result<Self> {
         let mut file = File::open(path).map_err(|e| Error::unreadable(path, &e))?;
         if file.metadata().is_ok_and(|m| m.is_dir()) {
             return Err(Error::new(FleetCode::ManifestInvalid, "the manifest is a folder").file(path));
         }
         let mut magic = Vec::new();
         Read::by_ref(&mut file).take(4).read_to_end(&mut magic).map_err(|e| Error::unreadable(path, &e))?;
-        let (columns, rows) = if magic == b"PAR1" { parquet::open(path)? } else { text::open(path)? };
-        check_columns(&columns).map_err(|e| e.file(path))?;
-        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-        Ok(Self { path: path.to_path_buf(), folder, rows, seen: HashSet::new() })
+        let opened = if magic == b"PAR1" { parquet::open(path) } else { text::open(path) };
+        let (columns, rows) = opened.map_err(|e| e.file(named))?;
+        check_columns(&columns).map_err(|e| e.file(named))?;
+        let folder = named.parent().unwrap_or(Path::new("")).to_path_buf();
+        Ok(Self { path: named.to_path_buf(), folder, rows, seen: HashSet::new(), _copy: copy })
     }
 
     fn entry(&mut self, number: u64, row: Result<Row>) -> Entry {

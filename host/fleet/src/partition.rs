@@ -16,6 +16,8 @@ use pam_data::error::{Error, Result};
 use pam_data::output::Turn;
 
 use crate::columns::{footer, rows};
+use crate::objects::Objects;
+use crate::storage::{is_remote, local_only};
 
 /// The entry of a Parquet footer that holds the key of the inputs.
 pub(crate) const KEY: &str = "pam-batch-key";
@@ -70,6 +72,7 @@ pub fn muscle_name(folder: &str) -> Option<String> {
 /// # Errors
 /// An output that cannot be read.
 pub fn muscles(output: &Path) -> Result<Vec<(String, PathBuf)>> {
+    local_only(output)?;
     let entries = fs::read_dir(output).map_err(|e| Error::unreadable(output, &e))?;
     let mut found = Vec::new();
     for entry in entries {
@@ -82,16 +85,72 @@ pub fn muscles(output: &Path) -> Result<Vec<(String, PathBuf)>> {
     Ok(found)
 }
 
-/// The output of a batch, with this run's place for unfinished results.
+/// The output of a batch: a folder, or a place in a bucket.
 #[derive(Debug)]
-pub struct Output {
+pub enum Output {
+    /// A folder of this machine.
+    Folder(Folder),
+    /// A place in a bucket.
+    Bucket(Bucket),
+}
+
+/// A place in a bucket.
+#[derive(Debug)]
+pub struct Bucket(Objects);
+
+impl Output {
+    /// Opens the output, creates it where needed, and removes what interrupted runs left.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn open(root: &Path) -> Result<Self> {
+        let address = root.to_string_lossy();
+        if is_remote(&address) {
+            return Ok(Self::Bucket(Bucket(Objects::open(&address)?)));
+        }
+        Folder::open(Path::new(address.strip_prefix("file://").unwrap_or(&address))).map(Self::Folder)
+    }
+
+    /// Whether results for this key are there, complete.
+    #[must_use]
+    pub fn has(&self, muscle: &str, key: &str) -> bool {
+        match self {
+            Self::Folder(folder) => folder.has(muscle, key),
+            Self::Bucket(bucket) => bucket.0.has(muscle, key),
+        }
+    }
+
+    /// Whether the stored results of a muscle list a failure.
+    #[must_use]
+    pub fn has_failures(&self, muscle: &str) -> bool {
+        match self {
+            Self::Folder(folder) => folder.has_failures(muscle),
+            Self::Bucket(bucket) => bucket.0.has_failures(muscle),
+        }
+    }
+
+    /// Makes the results of a muscle visible, in place of earlier ones.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn publish(&self, muscle: &str, files: &[(String, Vec<u8>)]) -> Result<()> {
+        match self {
+            Self::Folder(folder) => folder.publish(muscle, files),
+            Self::Bucket(bucket) => bucket.0.publish(muscle, files),
+        }
+    }
+}
+
+/// A folder for the results, with this run's place for unfinished ones.
+#[derive(Debug)]
+pub struct Folder {
     root: PathBuf,
     run: PathBuf,
     /// Held for as long as this run lives; the operating system releases it when the process ends.
     _lock: File,
 }
 
-impl Output {
+impl Folder {
     /// Opens the output, creates it where needed, and removes what interrupted runs left.
     ///
     /// # Errors
@@ -144,7 +203,7 @@ impl Output {
     }
 }
 
-impl Drop for Output {
+impl Drop for Folder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.run);
         // Other runs may be at work: a folder that is not empty stays.
@@ -236,7 +295,7 @@ mod tests {
     #[test]
     fn results_appear_whole_and_replace_older_ones() {
         let root = tempfile::tempdir().expect("a folder");
-        let output = Output::open(root.path()).expect("opened");
+        let output = Folder::open(root.path()).expect("opened");
         assert!(!output.has("a b", "1"));
         output.publish("a b", &files("1")).expect("published");
         assert!(output.has("a b", "1") && !output.has("a b", "2"));
@@ -257,10 +316,10 @@ mod tests {
         let dead = root.path().join(PARTIAL).join("run-dead");
         fs::create_dir_all(dead.join("muscle=a")).expect("made");
         fs::write(dead.join("lock"), "").expect("written");
-        let first = Output::open(root.path()).expect("opened");
+        let first = Folder::open(root.path()).expect("opened");
         assert!(!dead.exists());
         fs::create_dir(first.run.join("muscle=b")).expect("made");
-        let second = Output::open(root.path()).expect("opened");
+        let second = Folder::open(root.path()).expect("opened");
         assert!(first.run.join("muscle=b").exists(), "the first run still lives");
         drop((first, second));
         assert!(!root.path().join(PARTIAL).exists());

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::FleetCode;
 use crate::failures::Failure;
+use crate::storage::{self, is_remote};
 
 /// Files of one pattern; more are an error of the pattern.
 const MOST_FILES: usize = 10_000;
@@ -77,13 +78,16 @@ pub struct Inputs {
     pub list: Vec<Input>,
     /// Why a file cannot be used.
     pub error: Option<Error>,
+    /// Copies of objects in buckets, for as long as this lives.
+    copies: Option<tempfile::TempDir>,
+    copied: usize,
 }
 
 impl Inputs {
     /// Finds and hashes the files of a muscle.
     #[must_use]
     pub fn of(item: &WorkItem) -> Self {
-        let mut inputs = Self { list: Vec::new(), error: None };
+        let mut inputs = Self { list: Vec::new(), error: None, copies: None, copied: 0 };
         inputs.add(item, Role::Description, item.description.as_slice());
         inputs.add(item, Role::Import, item.import.as_slice());
         inputs.add(item, Role::Recording, &item.files);
@@ -93,7 +97,7 @@ impl Inputs {
 
     fn add(&mut self, item: &WorkItem, role: Role, names: &[String]) {
         for name in names {
-            let found = expand(&item.folder, name).unwrap_or_else(|e| {
+            let found = expand(&item.folder, name).and_then(|found| self.local(found)).unwrap_or_else(|e| {
                 self.error.get_or_insert(e);
                 vec![(name.clone(), item.folder.join(name))]
             });
@@ -107,6 +111,41 @@ impl Inputs {
                 let sha256 = hash.map_err(|e| self.error.get_or_insert(e.file(&path))).ok();
                 self.list.push(Input { role, name, path, sha256 });
             }
+        }
+    }
+
+    /// Copies of those files that are in buckets, with their names; others as they are.
+    fn local(&mut self, found: Vec<(String, PathBuf)>) -> Result<Vec<(String, PathBuf)>> {
+        found
+            .into_iter()
+            .map(|(name, path)| {
+                let address = path.to_string_lossy().into_owned();
+                if !is_remote(&address) {
+                    return Ok((name, path));
+                }
+                let bytes = storage::read_existing(&address)?;
+                let unwritable = |e: std::io::Error| Error::unwritable(&path, &e);
+                if self.copies.is_none() {
+                    self.copies = Some(tempfile::tempdir().map_err(unwritable)?);
+                }
+                let folder = self.copies.as_ref().map_or(Path::new(""), tempfile::TempDir::path);
+                // Each in a folder of its own: two objects may have the same last name.
+                let own = folder.join(self.copied.to_string());
+                self.copied += 1;
+                std::fs::create_dir(&own).map_err(unwritable)?;
+                let copy = own.join(path.file_name().unwrap_or("object".as_ref()));
+                std::fs::write(&copy, bytes).map_err(unwritable)?;
+                Ok((name, copy))
+            })
+            .collect()
+    }
+
+    /// An error whose place names the object in the place of its copy.
+    pub(crate) fn named(&self, error: Error) -> Error {
+        let Some(file) = error.place().file.clone() else { return error };
+        match self.list.iter().find(|i| i.path == file && self.copies.is_some()) {
+            Some(input) => error.file(Path::new(&input.name)),
+            None => error,
         }
     }
 
@@ -165,13 +204,18 @@ fn digest<'a>(parts: impl IntoIterator<Item = &'a str>) -> String {
 /// The files of a path or a pattern, sorted by name, each with its name in results.
 fn expand(folder: &Path, name: &str) -> Result<Vec<(String, PathBuf)>> {
     let local = name.strip_prefix("file://").unwrap_or(name);
+    let address =
+        if is_remote(local) { local.to_owned() } else { folder.join(local).to_string_lossy().into_owned() };
+    if is_remote(&address) {
+        return remote(folder, name, &address);
+    }
     if let Some((scheme, _)) = local.split_once("://") {
         return Err(Error::new(
             FleetCode::ManifestInvalid,
             format!("{scheme}:// addresses are not supported"),
         )
         .value(name)
-        .help("copy the files to this machine, or mount the storage"));
+        .help("use s3://, gs:// or az://, copy the files to this machine, or mount the storage"));
     }
     let path = folder.join(local);
     if !local.contains(['*', '?', '[']) || path.exists() {
@@ -193,18 +237,40 @@ fn expand(folder: &Path, name: &str) -> Result<Vec<(String, PathBuf)>> {
         found.push((shown, path));
     }
     if found.len() > MOST_FILES {
-        return Err(Error::new(
-            FleetCode::ManifestInvalid,
-            format!("the pattern matches more than {MOST_FILES} files"),
-        )
-        .value(name));
+        return Err(too_many(name));
     }
     if found.is_empty() {
-        return Err(Error::new(pam_data::error::DataCode::FileUnreadable, "no file matches the pattern")
-            .file(name)
-            .help("look at the folder: patterns are relative to the folder of the manifest"));
+        return Err(no_match(name));
     }
     Ok(found)
+}
+
+/// The objects of an address or a pattern in a bucket, sorted, each with its name in results.
+fn remote(folder: &Path, name: &str, address: &str) -> Result<Vec<(String, PathBuf)>> {
+    if !address.contains(['*', '?', '[']) {
+        return Ok(vec![(name.to_owned(), PathBuf::from(address))]);
+    }
+    let found = storage::list(address, MOST_FILES)?;
+    if found.len() > MOST_FILES {
+        return Err(too_many(name));
+    }
+    if found.is_empty() {
+        return Err(no_match(name));
+    }
+    let folder = format!("{}/", folder.to_string_lossy());
+    let shown = |object: &String| object.strip_prefix(&folder).unwrap_or(object).to_owned();
+    Ok(found.into_iter().map(|object| (shown(&object), PathBuf::from(object))).collect())
+}
+
+fn too_many(name: &str) -> Error {
+    Error::new(FleetCode::ManifestInvalid, format!("the pattern matches more than {MOST_FILES} files"))
+        .value(name)
+}
+
+fn no_match(name: &str) -> Error {
+    Error::new(pam_data::error::DataCode::FileUnreadable, "no file matches the pattern")
+        .file(name)
+        .help("look at the folder: patterns are relative to the folder of the manifest")
 }
 
 #[cfg(test)]
