@@ -135,6 +135,9 @@ fi
 if [ $tier = long ]; then
     step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \
         --test kills --test closed_loop --test commands --test batch --test soak
+    if require "batch in a bucket" python3 python3 python3-venv; then
+        step "batch in a bucket" env PAM_LONG=1 bash tests/fleet/run.sh
+    fi
     if has cargo-llvm-cov; then
         step "coverage" bash tests/coverage.sh
     else
