@@ -278,7 +278,7 @@ impl<T: Scalar> Muscle<T> {
         }
     }
 
-    /// The search from piece to piece. It goes on where the search on the first piece left it, and if that is not enough, it begins anew
+    /// The search from piece to piece. It continues where the search on the first piece left it, and if that is not enough, it begins anew
     /// within a bracket.
     #[cold]
     #[inline(never)]

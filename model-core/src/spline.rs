@@ -281,7 +281,7 @@ mod tests {
                 assert_eq!((nodes.place(p), *nodes.choose(p, &numbers)), (below, below), "{p} of {count}");
             }
             assert_eq!(nodes.place(f64::NAN), 0);
-            assert_eq!(nodes.place(f64::INFINITY), MAX_NODES, "behind the last node all pieces are alike");
+            assert_eq!(nodes.place(f64::INFINITY), MAX_NODES, "behind the last node all pieces are the same");
         }
     }
 }

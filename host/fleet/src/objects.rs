@@ -32,7 +32,7 @@ impl Objects {
     }
 
     fn table(&self, muscle: &str, table: &str) -> Option<bytes::Bytes> {
-        // What cannot be read counts as absent: it is computed again, and writing it tells what is wrong.
+        // What cannot be read counts as absent: it is computed again, and writing it reports what is wrong.
         storage::read(&self.address(muscle, &format!("{table}.parquet")))
             .ok()
             .flatten()

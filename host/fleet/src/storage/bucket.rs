@@ -16,7 +16,7 @@ use pam_data::error::{DataCode, Error, Result};
 use tokio::runtime::Runtime;
 use url::Url;
 
-/// Requests are repeated this often, and for this long, if a server does not answer: it may restart, but a wrong endpoint must be told
+/// Requests are repeated this often, and for this long, if a server does not answer: it may restart, but a wrong endpoint must be reported
 /// soon. The defaults of `object_store` are 10 and 3 minutes.
 const RETRIES: usize = 4;
 const RETRY_SECONDS: u64 = 20;
