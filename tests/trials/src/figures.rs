@@ -102,6 +102,11 @@ fn null(o: &Outcome) -> bool {
 }
 
 impl Figures {
+    /// A figure that only names have; a dash where nothing was named.
+    pub fn of_names(&self, figure: String) -> String {
+        if self.probabilities > 0 { figure } else { "–".into() }
+    }
+
     /// Of some trials.
     pub fn of(all: &[&Scored]) -> Self {
         let it = || all.iter().map(|s| &s.0);

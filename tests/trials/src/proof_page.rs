@@ -31,14 +31,26 @@ const INTRODUCTION: &str = "# Sealed trials\n\n\
     instead of the oracle, a plain table of the same muscle without the effect; this table is complete, and no refit can be better. The \
     oracle's own share of this stricter gain is given too.\n";
 
+/// The same for a set without effects.
+const WITHOUT_EFFECTS: &str = "# Sealed trials without effects\n\n\
+    A diagnosis must name nothing where nothing is missing. These trials are made, sealed, answered and opened like the \
+    [sealed trials](proof.md), but no muscle has an effect. In the nasty half the data are bad or the rubber is strongly curved. These \
+    commands wrote this page; nothing on it is typed by hand:\n\n\
+    ```text\n\
+    cargo run --release -p trials -- prove --set nulls --n 300 -o DIR\n\
+    cargo run --release -p trials -- score DIR --page docs/src/proof-nulls.md\n\
+    ```\n\n\
+    Rates have exact 95 % intervals: of 60 trials without a false alarm the true rate may still be 6 %, of 300 it is at most 1.2 %.\n";
+
 /// Writes the page of a scored set.
 pub fn write(set: &Path, page: &Path) -> Result<(), Box<dyn Error>> {
     let ledger = ledger::read_ledger(set)?;
     let report = std::fs::read_to_string(set.join("report.md"))?;
     let body = report.split_once('\n').map_or("", |(_, rest)| rest).replace("\n## ", "\n### ");
     let title = report.lines().next().unwrap_or("").trim_start_matches("# ");
+    let introduction = if ledger.set == "nulls" { WITHOUT_EFFECTS } else { INTRODUCTION };
     let text = format!(
-        "{INTRODUCTION}\n\
+        "{introduction}\n\
          ## {title}\n\nSHA-256 of the seed: `{}`. The set's `ledger.json` contains the hashes of all truths and answers (SHA-256 of \
          that file: `{}`).\n{body}",
         ledger.seed_sha256,
@@ -55,7 +67,8 @@ mod tests {
     use crate::book;
 
     #[test]
-    fn the_page_in_the_book_has_this_introduction() {
+    fn the_pages_in_the_book_have_these_introductions() {
         book::contains("proof.md", &[INTRODUCTION]);
+        book::contains("proof-nulls.md", &[WITHOUT_EFFECTS]);
     }
 }
