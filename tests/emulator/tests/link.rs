@@ -14,7 +14,8 @@ use model_core::link::hello::Board;
 use model_core::link::messages::{
     Evaluate, Mode, PIECE, Point, Refusal, RollBack, Side, State, TableBegin, TableFault, TablePiece,
 };
-use model_core::muscle::Muscle;
+use model_core::muscle::{AtStroke, Muscle};
+use model_core::single_precision;
 use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
 use pam_device::{Client, Port, tables};
@@ -154,9 +155,10 @@ fn host_and_target_compute_the_same_bits() {
                 let pressure = Pressure::from_pascals(point.pressure_pa);
                 let stroke = Length::from_metres(point.stroke_m);
                 let s = f32::from(direction);
-                let force = muscle.force(pressure, stroke, s);
-                let found =
-                    muscle.pressure_for(force, &muscle.at_stroke(stroke), s, pressure, &muscle.search());
+                let mut held = AtStroke::NONE;
+                let force = single_precision::pose(&muscle, &mut held, stroke, pressure, s);
+                let search = muscle.search();
+                let found = single_precision::pressure_for(&muscle, &held, s, force, pressure, &search);
                 assert_eq!(value.force_n.to_bits(), force.newtons().to_bits(), "force at {point:?}");
                 assert_eq!(
                     value.pressure_pa.to_bits(),

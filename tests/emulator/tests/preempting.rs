@@ -6,7 +6,8 @@ use emulator_tests::machine::{self, Folder};
 use emulator_tests::{Machine, Options, image_of, tracking, upload};
 use model_core::link::endpoints::{EvaluateTable, GetInfo, GetSettings, GetStatus};
 use model_core::link::messages::{Evaluate, Event, Mode, Point, Reference, Side, State};
-use model_core::muscle::Muscle;
+use model_core::muscle::{AtStroke, Muscle};
+use model_core::single_precision;
 use model_core::table;
 use model_core::units::{Length, Pressure};
 use pam_device::{Topic, tables};
@@ -56,9 +57,10 @@ fn answers_are_whole_while_control_steps_interrupt_their_making() {
         .map(|point| {
             let (pressure, stroke) =
                 (Pressure::from_pascals(point.pressure_pa), Length::from_metres(point.stroke_m));
-            let force = muscle.force(pressure, stroke, 1.0);
-            let found =
-                muscle.pressure_for(force, &muscle.at_stroke(stroke), 1.0, pressure, &muscle.search());
+            let mut held = AtStroke::NONE;
+            let force = single_precision::pose(&muscle, &mut held, stroke, pressure, 1.0);
+            let search = muscle.search();
+            let found = single_precision::pressure_for(&muscle, &held, 1.0, force, pressure, &search);
             [force.newtons().to_bits(), found.pressure.pascals().to_bits()]
         })
         .collect();
