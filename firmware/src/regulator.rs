@@ -52,7 +52,7 @@ impl Default for Air {
 pub struct Demand {
     /// Pressure in the muscle, Pa.
     pub pressure_pa: f32,
-    /// Part of the last change of that pressure that was known ahead, Pa; it is demanded [`ahead`] ticks early.
+    /// Part of the last change of that pressure that was known ahead, Pa; it is demanded [`Law::ahead`] ticks early.
     pub lookahead_pa: f32,
 }
 
