@@ -15,7 +15,7 @@ use super::runs::{Run, Runs};
 use super::shapes::{Change, Class};
 use super::surface::Surface;
 use super::table_surface;
-use super::weighing::{Inexact, Round, Weighing, is_lag, weigh};
+use super::weighing::{Inexact, Round, Weighing, weigh};
 
 /// A change that is named, with the shape that it has in the cells.
 #[derive(Debug, Clone)]
@@ -101,7 +101,7 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
         let next = next.map(|n| with_course(&cells, &present, by.surface, n));
         let next = next.map(|n| with_own_slopes(about.runs, &mut cells, &present, by.surface, n));
         let Some(next) = next.filter(other) else {
-            let left = none < NAMED && !by.moving && !accepted.iter().any(|a| is_lag(a.change));
+            let left = none < NAMED && !by.moving && !accepted.iter().any(|a| a.change.is_lag());
             let without_lag = Weighing { lag: None, inexact, ..by };
             let mut last = round.posterior.clone();
             if left
@@ -109,18 +109,16 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
                 && let Some(pair) = pairs::search(&cells, contrast, without_lag, first)
             {
                 accepted = both(&cells, by.surface, &pair);
-                let shapes: Vec<DVector<f64>> = accepted.iter().map(|a| a.shape.clone()).collect();
-                last = weigh(&cells, &contrast.without_shapes(&shapes), without_lag).posterior;
+                last = weigh(&cells, &beyond(contrast, &accepted), without_lag).posterior;
             }
             let base = without_lags(contrast, &accepted, &cells);
             if !by.moving && revisit(&cells, &base, without_lag, &mut accepted) {
-                let shapes: Vec<DVector<f64>> = accepted.iter().map(|a| a.shape.clone()).collect();
-                last = weigh(&cells, &base.without_shapes(&shapes), without_lag).posterior;
+                last = weigh(&cells, &beyond(&base, &accepted), without_lag).posterior;
             }
             refit(&base, &mut accepted, &cells);
             return Named { cells, accepted, last };
         };
-        if is_lag(next.change) {
+        if next.change.is_lag() {
             let trace = lag::trace(&cells);
             let before = present.energy;
             present = present.with_residual(&present.residual - &trace).without_shapes(&[trace]);
@@ -179,7 +177,7 @@ fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late:
 
 /// The same change with its course and its size; the course where the spread of the runs is judged without the change.
 fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
-    if is_lag(found.change) {
+    if found.change.is_lag() {
         return found;
     }
     let sizes = SIZES.map(|s| s * surface.largest);
@@ -221,9 +219,14 @@ fn with_own_slopes(
     found
 }
 
+/// What is left beside the shapes of names, at any size.
+fn beyond<'a>(contrast: &Contrast, names: impl IntoIterator<Item = &'a Accepted>) -> Contrast {
+    contrast.without_shapes(&names.into_iter().map(|a| a.shape.clone()).collect::<Vec<_>>())
+}
+
 /// Without what a named lag does, at any size.
 fn without_lags(contrast: &Contrast, accepted: &[Accepted], cells: &[Cell]) -> Contrast {
-    if !accepted.iter().any(|a| is_lag(a.change)) {
+    if !accepted.iter().any(|a| a.change.is_lag()) {
         return contrast.clone();
     }
     let trace = lag::trace(cells);
@@ -232,17 +235,18 @@ fn without_lags(contrast: &Contrast, accepted: &[Accepted], cells: &[Cell]) -> C
 
 /// Weighs each name once more beside the others: the first one was found while the others were in the difference. Whether any changed.
 fn revisit(cells: &[Cell], base: &Contrast, by: Weighing<'_>, accepted: &mut [Accepted]) -> bool {
-    let places: Vec<usize> = (0..accepted.len()).filter(|i| !is_lag(accepted[*i].change)).collect();
+    let places: Vec<usize> = (0..accepted.len()).filter(|i| !accepted[*i].change.is_lag()).collect();
     let mut changed = false;
     if accepted.len() < 2 {
         return changed;
     }
     for &i in &places {
         let others: Vec<usize> = places.iter().copied().filter(|o| *o != i).collect();
-        let shapes: Vec<DVector<f64>> = others.iter().map(|o| accepted[*o].shape.clone()).collect();
-        let rest = base.without_shapes(&shapes);
+        let rest = beyond(base, others.iter().map(|o| &accepted[*o]));
         let round = weigh(cells, &rest, by);
-        let Some((change, probability)) = round.posterior.leader().filter(|l| !is_lag(l.0)) else { continue };
+        let Some((change, probability)) = round.posterior.leader().filter(|l| !l.0.is_lag()) else {
+            continue;
+        };
         if others.iter().any(|o| accepted[*o].change.class() == change.class()) {
             continue;
         }
@@ -255,7 +259,7 @@ fn revisit(cells: &[Cell], base: &Contrast, by: Weighing<'_>, accepted: &mut [Ac
 
 /// Sizes of several changes beside each other. `base`: without what a named lag does.
 fn refit(base: &Contrast, accepted: &mut [Accepted], cells: &[Cell]) {
-    let places: Vec<usize> = (0..accepted.len()).filter(|i| !is_lag(accepted[*i].change)).collect();
+    let places: Vec<usize> = (0..accepted.len()).filter(|i| !accepted[*i].change.is_lag()).collect();
     if places.is_empty() || accepted.len() < 2 {
         return;
     }

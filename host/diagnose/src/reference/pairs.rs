@@ -6,7 +6,7 @@ use super::contrast::Contrast;
 use super::course;
 use super::criteria::{PAIRS_TRIED, SIZES};
 use super::shapes::Change;
-use super::weighing::{Round, Weighing, is_lag, weigh};
+use super::weighing::{Round, Weighing, weigh};
 
 /// Two changes, and the weighing of each where the other one is taken out.
 pub(super) struct Pair {
@@ -41,7 +41,7 @@ pub(super) fn search(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>, firs
     };
     let leads = |round: &Round, like: Change| -> Option<Change> {
         let leader = round.posterior.leader()?.0;
-        (!is_lag(leader) && leader.class() == like.class()).then_some(leader)
+        (!leader.is_lag() && leader.class() == like.class()).then_some(leader)
     };
     let mutual = |(_, i, other): &(f64, usize, Change)| -> Option<Pair> {
         let one = first.courses[*i].0;

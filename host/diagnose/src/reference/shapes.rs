@@ -282,6 +282,11 @@ pub const EFFECTS: [About; 24] = [
 ];
 
 impl Change {
+    /// Whether it is a lag between channels, which rows in motion show.
+    pub(super) fn is_lag(self) -> bool {
+        matches!(self, Self::SensorDelay | Self::PressureSensorLag)
+    }
+
     /// Its line of the table.
     #[must_use]
     pub fn about(self) -> &'static About {

@@ -55,10 +55,6 @@ impl Inexact {
     }
 }
 
-pub(super) fn is_lag(change: Change) -> bool {
-    matches!(change, Change::SensorDelay | Change::PressureSensorLag)
-}
-
 /// What a weighing depends on beside the cells.
 #[derive(Clone, Copy)]
 pub(super) struct Weighing<'a> {

@@ -2,7 +2,6 @@
 
 use super::answer::{ChangeReport, Considered, Left, Remark, Split, Verdict, WhyNot};
 use super::criteria::{LEFT_BY_NAMES, OTHER_ACTUATOR, UNSEEN_LEAST};
-use super::shapes::Change;
 
 /// Withdraws the names of a report where it must not give any.
 pub(super) fn withdraw(report: &mut ChangeReport) {
@@ -14,8 +13,7 @@ pub(super) fn withdraw(report: &mut ChangeReport) {
         }
     }
     // A lag shows in rows in motion; the held-out cells are of rows at rest.
-    let lag = |c: Change| matches!(c, Change::SensorDelay | Change::PressureSensorLag);
-    let judged = !report.missing.iter().any(|m| lag(m.change));
+    let judged = !report.missing.iter().any(|m| m.change.is_lag());
     // A change that happened describes the recordings that did not determine its size, too, where it shows.
     let held = report.held_out.split != Split::None;
     if judged && held && report.held_out.share_where_shown < UNSEEN_LEAST {
