@@ -219,7 +219,7 @@ fn with_own_slopes(
     found
 }
 
-/// What is left beside the shapes of names, at any size.
+/// The contrast without the shapes of names, at any size.
 fn beyond<'a>(contrast: &Contrast, names: impl IntoIterator<Item = &'a Accepted>) -> Contrast {
     contrast.without_shapes(&names.into_iter().map(|a| a.shape.clone()).collect::<Vec<_>>())
 }
