@@ -198,11 +198,6 @@ impl Controller {
         &mut self.trace
     }
 
-    /// The generator.
-    pub fn generator(&mut self) -> &mut Generator {
-        &mut self.generator
-    }
-
     /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings

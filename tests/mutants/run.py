@@ -1,13 +1,16 @@
 """Changes the controller on purpose and looks whether its tests notice; see tests/mutants.sh."""
 
+import hashlib
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
 import tomllib
+from datetime import date
 from pathlib import Path
+
+from one_program import Program, Source, listed
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
@@ -33,7 +36,7 @@ def copied():
 
 def tested(place):
     """Whether the tests pass, fail, or cannot be built."""
-    environment = os.environ | {"CARGO_TARGET_DIR": str(TARGET / "mutants-built"), "RUSTFLAGS": "-Awarnings"}
+    environment = os.environ | {"CARGO_TARGET_DIR": str(TARGET / "mutants-built"), "RUSTFLAGS": "--cap-lints=allow"}
     built = subprocess.run([*TESTS, "--no-run"], cwd=place, env=environment, capture_output=True, text=True)
     if built.returncode:
         return "not built", built.stderr
@@ -80,49 +83,55 @@ def removed(only=None):
     return all(one["outcome"] == "caught" for one in found)
 
 
-def generated(arguments):
-    """Runs cargo-mutants on the files of its configuration and adds its outcomes to those of earlier runs."""
-    output = TARGET / "mutants-generated"
-    output.mkdir(parents=True, exist_ok=True)
-    if shutil.which("cargo-mutants") is None:
-        sys.exit("no cargo-mutants: install it with `cargo install --locked cargo-mutants`")
-    command = ["cargo", "mutants", "-j1", "--no-shuffle", "--output", str(output), *arguments]
-    subprocess.run(command, cwd=ROOT, env=os.environ | {"CARGO_TARGET_DIR": str(TARGET / "mutants-cargo")})
-    collected(output / "mutants.out/outcomes.json")
+def generated(begins, only_missed=False):
+    """Judges the changes of cargo-mutants in the files whose paths begin like one of these, and adds the outcomes to those of earlier runs."""
+    every = listed(ROOT)
+    kept = kept_outcomes(every)
+    wanted = [one for begin in begins or [""] for one in every if one["file"].startswith(begin)]
+    if only_missed:
+        wanted = [one for one in wanted if kept[one["name"]]["outcome"] in ("missed", "not judged")]
+    print(f"{len(wanted)} changes to judge", flush=True)
+    if wanted:
+        program = Program(copied(), TARGET / "mutants-built", wanted)
+        program.build()
+        for mutant, outcome in program.judge():
+            one = kept[mutant["name"]]
+            one["outcome"], one["judged"] = outcome, str(date.today())
+            if outcome == "missed":
+                print(f"{outcome:10} {mutant['name']}\n           {one['text']}", flush=True)
+            keep(kept)
+    keep(kept)
 
 
-def missed():
-    """The arguments that select the changes which no test has caught yet: lines move with every edit, so that they are not part of it."""
-    mutants = json.loads((RESULTS / "generated.json").read_text())
-    wanted = sorted({(one["file"], one["change"]) for one in mutants if one["outcome"] == "missed"})
-    return [part for file, change in wanted for part in ("--re", f"^{re.escape(file)}:[0-9]+:[0-9]+: {re.escape(change)}$")]
+def code_hash(text):
+    """Of a file without its tests, so that an outcome is that of the code that was judged."""
+    code = text.split("\n#[cfg(test)]\nmod ")[0]
+    return hashlib.sha256(code.encode()).hexdigest()[:12]
 
 
-def collected(outcomes):
-    """Adds the outcomes of a run to the kept ones. Those of the same changes are replaced, wherever they were."""
-    kept = RESULTS / "generated.json"
-    fresh = {
-        (mutant["file"], mutant["name"].split(": ", 1)[1])
-        for one in json.loads(outcomes.read_text())["outcomes"]
-        if isinstance(one["scenario"], dict) and (mutant := one["scenario"].get("Mutant"))
-    }
-    earlier = json.loads(kept.read_text()) if kept.exists() else []
-    known = {one["name"]: one for one in earlier if (one["file"], one["change"]) not in fresh}
-    for one in json.loads(outcomes.read_text())["outcomes"]:
-        mutant = one["scenario"].get("Mutant") if isinstance(one["scenario"], dict) else None
-        if mutant:
-            summary = {"CaughtMutant": "caught", "MissedMutant": "missed", "Timeout": "caught", "Unviable": "not built"}
-            # Without line and column, which move with every edit.
-            name = mutant["name"].split(": ", 1)[1]
-            line = mutant["span"]["start"]["line"]
-            known[mutant["name"]] = {
-                "name": mutant["name"], "file": mutant["file"], "line": line, "change": name,
-                # The same change may occur in several lines of a function.
-                "text": (ROOT / mutant["file"]).read_text().splitlines()[line - 1].strip(),
-                "outcome": summary.get(one["summary"], "missed"),
-            }
+def kept_outcomes(every):
+    """The outcomes of earlier runs for the changes that there are now; `not judged` where the file has changed since."""
+    path = RESULTS / "generated.json"
+    earlier = {one["name"]: one for one in json.loads(path.read_text())} if path.exists() else {}
+    kept, texts = {}, {file: (ROOT / file).read_text() for file in {one["file"] for one in every}}
+    for mutant in every:
+        name, text = mutant["name"], texts[mutant["file"]]
+        line = mutant["span"]["start"]["line"]
+        lines = text.splitlines()
+        kept[name] = {
+            "name": name, "file": mutant["file"], "line": line, "change": name.split(": ", 1)[1], "text": lines[line - 1].strip(),
+            "becomes": Source(text).changed(mutant, (0, len(text))).splitlines()[line - 1].strip(),
+            "code": code_hash(text), "outcome": "not judged",
+        }
+        before = earlier.get(name, {})
+        if before.get("code") == kept[name]["code"]:
+            kept[name] |= {key: before[key] for key in ("outcome", "judged") if key in before}
+    return kept
+
+
+def keep(kept):
     RESULTS.mkdir(exist_ok=True)
-    kept.write_text(json.dumps(list(known.values()), indent=1) + "\n")
+    (RESULTS / "generated.json").write_text(json.dumps(list(kept.values()), indent=1) + "\n")
 
 
 def page():
@@ -131,11 +140,15 @@ def page():
     kept = RESULTS / "generated.json"
     mutants = json.loads(kept.read_text()) if kept.exists() else []
     accepted = tomllib.loads((HERE / "equivalent.toml").read_text()).get("mutant", [])
+    hashes = {file: code_hash((ROOT / file).read_text()) for file in {one["file"] for one in mutants}}
 
     def reason(mutant):
         """Why nothing could notice a change; none where it is not in the list."""
-        fits = lambda one: (one["file"], one["change"]) == (mutant["file"], mutant["change"]) and one["text"] in mutant.get("text", "")
+        fits = lambda one: (one["file"], one["change"]) == (mutant["file"], mutant["change"]) and one["text"] in (mutant["text"], mutant["becomes"])
         return next((one["reason"] for one in accepted if fits(one)), None)
+
+    def is_judged(mutant):
+        return mutant["outcome"] != "not judged" and mutant["code"] == hashes[mutant["file"]]
 
     text = [
         "# Tests of the safety functions", "",
@@ -153,33 +166,37 @@ def page():
         return
     text += [
         "", "## Generated changes", "",
-        "cargo-mutants replaces operators and return values. Changes that do not compile are left out.", "",
-        "| file | changes | caught | equivalent | not caught |", "| --- | ---: | ---: | ---: | ---: |",
+        "cargo-mutants replaces operators and return values, and deletes arms and fields. Changes that do not compile are left out. A change is",
+        "*equivalent* if no test can notice it; the reasons follow below. An outcome holds for the code that was judged: after a file has changed,",
+        "its changes count as *not judged*.", "",
+        "| file | judged | changes | caught | equivalent | not caught | not judged |", "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
     ]
-    total = [0, 0, 0, 0]
+    total = [0] * 5
     built = [one for one in mutants if one["outcome"] != "not built"]
     for file in sorted({one["file"] for one in built}):
         here = [one for one in built if one["file"] == file]
-        caught = sum(one["outcome"] == "caught" for one in here)
-        same = sum(one["outcome"] == "missed" and reason(one) is not None for one in here)
-        row = [len(here), caught, same, len(here) - caught - same]
+        judged = [one for one in here if is_judged(one)]
+        missed = [one for one in judged if one["outcome"] == "missed"]
+        same = sum(reason(one) is not None for one in missed)
+        row = [len(here), len(judged) - len(missed), same, len(missed) - same, len(here) - len(judged)]
         total = [a + b for a, b in zip(total, row)]
-        text.append(f"| `{file}` | " + " | ".join(map(str, row)) + " |")
-    text.append("| **all** | " + " | ".join(f"**{n}**" for n in total) + " |")
-    missed = [one for one in built if one["outcome"] == "missed"]
+        day = max((one["judged"] for one in judged), default="—")
+        text.append(f"| `{file}` | {day} | " + " | ".join(map(str, row)) + " |")
+    text.append("| **all** | | " + " | ".join(f"**{n}**" for n in total) + " |")
+    missed = [one for one in built if is_judged(one) and one["outcome"] == "missed"]
     same = [one for one in missed if reason(one) is not None]
     if same:
-        text += ["", "## Equivalent changes", "", "These changes make no difference that a test could see.", "", "| change | reason |", "| --- | --- |"]
-        text += [f"| `{one['file']}`: {cell(one)} | {reason(one)} |" for one in same]
+        text += ["", "## Equivalent changes", "", "These changes make no difference that a test can notice.", "", "| file | change | changed line | reason |", "| --- | --- | --- | --- |"]
+        text += [f"| `{one['file']}` | {cell(one['change'])} | {cell(one['text'])} | {reason(one)} |" for one in same]
     rest = [one for one in missed if one not in same]
     if rest:
-        text += ["", "## Changes that no test of the host catches", "", "| file | change |", "| --- | --- |"]
-        text += [f"| `{one['file']}` | {cell(one)} |" for one in rest]
+        text += ["", "## Changes that no test of the host catches", "", "| file | change | changed line |", "| --- | --- | --- |"]
+        text += [f"| `{one['file']}` | {cell(one['change'])} | {cell(one['text'])} |" for one in rest]
     PAGE.write_text("\n".join(text) + "\n")
 
 
-def cell(one):
-    return "`" + one["change"].replace("|", "\\|") + "`"
+def cell(code):
+    return "`" + code.replace("|", "\\|") + "`"
 
 
 def main(arguments):
@@ -189,9 +206,7 @@ def main(arguments):
         case ["--generated", *rest]:
             generated(rest)
         case ["--missed", *rest]:
-            generated([*missed(), *rest])
-        case ["--collect", path]:
-            collected(Path(path))
+            generated(rest, only_missed=True)
         case ["--page"]:
             page()
         case []:
@@ -200,7 +215,8 @@ def main(arguments):
             page()
             sys.exit(not whole)
         case _:
-            sys.exit("tests/mutants.sh [--removed [NAME] | --generated [ARGUMENTS] | --missed | --page]")
+            sys.exit("tests/mutants.sh [--removed [NAME] | --generated [FILE…] | --missed [FILE…] | --page]")
 
 
-main(sys.argv[1:])
+if __name__ == "__main__":
+    main(sys.argv[1:])

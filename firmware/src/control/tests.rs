@@ -7,10 +7,12 @@ use super::Controller;
 use crate::board::{Inputs, Outputs, Readings, Signals};
 use crate::watch::Finding;
 
+mod comparison;
 mod exact;
 mod inputs;
 mod joint;
 mod ownership;
+mod recorded;
 mod refusals;
 mod tracking;
 

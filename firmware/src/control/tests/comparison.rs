@@ -1,0 +1,54 @@
+//! When the load cell is compared with the table.
+
+use model_core::link::messages::HealthSums;
+
+use super::tracking::frictionless;
+use super::*;
+use crate::health::BLOCK_TICKS;
+
+/// Pressure at which the table's force is large enough to be compared, Pa.
+const STANDS_PA: f32 = 300e3;
+
+/// Blocks of the comparison of each muscle after three blocks' time, in which pressure stands in both, whatever is commanded.
+fn blocks(fitted: bool, prepare: impl FnOnce(&mut Controller)) -> [u32; 2] {
+    let mut bench = Bench::new(|settings| {
+        settings.watch.follow_pa = 1e6;
+        settings.force.fitted = fitted;
+    });
+    for side in Side::ALL {
+        assert_eq!(bench.controller.use_table(side, &frictionless()), Ok(()));
+    }
+    bench.pass(10);
+    prepare(&mut bench.controller);
+    let state = bench.controller.state();
+    bench.pass_with(3 * u32::from(BLOCK_TICKS), |now, inputs| {
+        now.pressure_pa += STANDS_PA - now.pressure_pa.round();
+        inputs.sides[1] = Some((*now).into());
+    });
+    assert_eq!(bench.controller.state(), state, "{:?}", bench.latched());
+    Side::ALL.map(|side| {
+        let mut sums = HealthSums::default();
+        bench.controller.health(side).describe(&mut sums);
+        sums.blocks
+    })
+}
+
+fn runs(mode: Mode) -> impl FnOnce(&mut Controller) {
+    move |controller| {
+        assert_eq!(controller.arm(OWNER), Ok(()));
+        assert_eq!(controller.start(mode, OWNER), Ok(()));
+    }
+}
+
+#[test]
+fn a_load_cell_is_compared_only_on_the_muscles_of_a_mode_that_controls() {
+    let none = [0; 2];
+    let [compared, other] = blocks(true, runs(Mode::Pressure));
+    assert!((2..=3).contains(&compared) && other == 0, "{compared} {other}");
+    let [first, second] = blocks(true, runs(Mode::Pair));
+    assert_eq!((first, second), (compared, compared), "both muscles of a joint");
+    assert_eq!(blocks(true, |_| ()), none, "disarmed");
+    assert_eq!(blocks(true, |controller| assert_eq!(controller.arm(OWNER), Ok(()))), none, "armed");
+    assert_eq!(blocks(true, runs(Mode::Vent)), none, "venting");
+    assert_eq!(blocks(false, runs(Mode::Pressure)), none, "without a load cell");
+}
