@@ -195,7 +195,7 @@ class Program:
 
     def judge(self, jobs=2):
         """Each change with its outcome, as they come."""
-        for file in ("firmware/", "model-core/"):
+        for file in ("firmware/src/lib.rs", "model-core/src/lib.rs"):
             if self.outcome(0, file) != "missed":
                 sys.exit("the tests fail before anything is changed")
         apart = {one["id"] for one in self.alone} | self.not_built

@@ -9,6 +9,7 @@ use model_core::link::settings::Settings;
 use model_core::table;
 use model_core::units::Pressure;
 
+mod answered;
 mod bus;
 mod protection;
 
