@@ -286,4 +286,56 @@ mod tests {
         let with_effect = |t: &mut MuscleTable| t.effects = [short.clone()].into_iter().collect();
         assert_eq!(wrong(&with_effect), Err(TableError::Effect(0)));
     }
+
+    #[test]
+    fn a_number_at_its_limit_is_taken_and_the_next_one_is_not() {
+        type Change = fn(&mut MuscleTable, f32);
+        let cases: [(TableError, f32, f32, Change); 6] = [
+            (TableError::Deadband, -1e5, 1e6, |t, v| t.deadband = Pressure::from_pascals(v)),
+            (TableError::Elastic(3), -STIFFEST, STIFFEST, |t, v| t.elastic[2][5] = v),
+            (TableError::Friction, -0.5, 0.95, |t, v| t.friction[5] = v),
+            (TableError::Tested, f32::MIN, 552e3, |t, v| t.tested.pressure_low = Pressure::from_pascals(v)),
+            (TableError::Tested, f32::MIN, 0.077, |t, v| t.tested.contraction_low = v),
+            (TableError::MaxPressure, 0.0_f32.next_up(), f32::MAX, |t, v| {
+                t.max_pressure = Pressure::from_pascals(v);
+            }),
+        ];
+        for (error, low, high, change) in cases {
+            let with = |value: f32| {
+                let mut t = example();
+                change(&mut t, value);
+                t.check()
+            };
+            assert_eq!([with(low), with(high)], [Ok(()), Ok(())], "{error:?}");
+            for value in [low.next_down(), high.next_up(), f32::NAN, f32::INFINITY] {
+                assert_eq!(with(value), Err(error), "{value}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_curve_has_one_value_for_each_node_and_an_effect_all_of_its_numbers() {
+        let wrong = |change: fn(&mut MuscleTable)| {
+            let mut t = example();
+            let effect = crate::effects::EffectName::CoulombFriction;
+            let parameters = [0.1; 8];
+            t.effects.push(FittedEffect::new(effect, &parameters[..effect.parameter_count()])).expect("room");
+            assert_eq!(t.check(), Ok(()));
+            change(&mut t);
+            t.check()
+        };
+        assert_eq!(wrong(|t| drop(t.elastic[0].pop())), Err(TableError::Elastic(1)));
+        assert_eq!(wrong(|t| drop(t.friction.pop())), Err(TableError::Friction));
+        assert_eq!(wrong(|t| t.nodes[0] = f32::NAN), Err(TableError::Node(0)));
+        assert_eq!(wrong(|t| t.nodes[5] = f32::INFINITY), Err(TableError::Node(5)));
+        assert_eq!(wrong(|t| t.nodes[1] = 0.0), Err(TableError::Node(1)));
+        assert_eq!(wrong(|t| t.effects[0].parameters[0] = f32::NAN), Err(TableError::Effect(0)));
+        assert_eq!(wrong(|t| drop(t.effects[0].remembered.push(f32::NAN))), Err(TableError::Effect(0)));
+        assert_eq!(
+            wrong(|t| t.tested.pressure_high = Pressure::from_pascals(f32::NAN)),
+            Err(TableError::Tested)
+        );
+        assert_eq!(wrong(|t| t.tested.contraction_high = f32::NAN), Err(TableError::Tested));
+        assert_eq!(example().order(), 4);
+    }
 }

@@ -29,8 +29,8 @@ pub fn change_in_force() -> u32 {{
 """
 # The tests take seconds. A change that makes them take this long does not end, or hardly.
 PATIENCE_S = 60
-# Parts of the names of tests that take seconds. They run last, on what the others do not notice.
-LATE = ["correlated_noise", "watch::tests::calm", "loses_power", "lose_power"]
+# Parts of the names of tests that take seconds, by their module. They run last, on changes of their module that the others do not notice.
+LATE = {"health": ["correlated_noise"], "watch": ["watch::tests::calm"], "store": ["loses_power", "lose_power"]}
 # What is no code: comments, strings, characters (but no lifetimes).
 NO_CODE = re.compile(r"//[^\n]*|/\*.*?\*/|r(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\[^\n]*?|[^'\\\n])'", re.DOTALL)
 INLINE = re.compile(r"#\[inline(\((always|never)\))?\]")
@@ -178,9 +178,10 @@ class Program:
         # The firmware uses the model, not the other way round.
         crates = ["firmware"] if file.startswith("firmware/") else ["model_core", "firmware"]
         # First the tests of the file's own module, which notice most.
-        module = file.split("/")[2].removesuffix(".rs") + "::"
-        skipped = [part for name in LATE for part in ("--skip", name)]
-        for chosen in [[module, *skipped], [*skipped, "--skip", module], LATE]:
+        module = file.split("/")[2].removesuffix(".rs")
+        skipped = [part for names in LATE.values() for name in names for part in ("--skip", name)]
+        stages = [[f"{module}::", *skipped], [*skipped, "--skip", f"{module}::"]]
+        for chosen in [*stages, LATE[module]] if module in LATE else stages:
             for crate in crates:
                 folder = self.place / crate.replace("_", "-")
                 environment = self.environment | {VARIABLE: str(number), "CARGO_MANIFEST_DIR": str(folder)}

@@ -223,3 +223,61 @@ fn one_good_tick_begins_every_count_anew() {
         assert!(found.iter().all(|(_, finding)| finding.fault == fault), "{fault:?}");
     }
 }
+
+#[test]
+fn the_higher_of_two_pressure_sensors_is_judged_while_both_are_watched() {
+    let mut settings = wide();
+    let limit = settings.limits.pressure_pa;
+    let both = |first: f32, second: f32| Seen { second_pa: Some(second), ..still(first, 0.0, 0.0) };
+    // Apart by so much that their own watch says nothing.
+    for (watched_pa, first, second, judged) in [
+        (1e6, limit + 1.0, 0.0, Some(limit + 1.0)),
+        (1e6, 0.0, limit + 1.0, Some(limit + 1.0)),
+        (1e6, limit, limit, None),
+        (0.0, 0.0, limit + 1.0, None),
+        (0.0, limit + 1.0, 0.0, Some(limit + 1.0)),
+    ] {
+        settings.watch.second_pressure_pa = watched_pa;
+        let found = repeated(both(first, second), &settings, Fault::OverPressure);
+        let value = found.map(|(tick, finding)| (tick, finding.value));
+        assert_eq!(value, judged.map(|value| (2, value)), "{first} and {second}");
+    }
+}
+
+#[test]
+fn two_watches_that_count_alike_are_both_reported_and_both_begin_anew_in_a_good_tick() {
+    let settings = wide();
+    let limits = settings.limits;
+    let good = still(200e3, 0.0, 0.0);
+    let over: [fn(&mut Seen, &mut Readings, &Settings); 4] = [
+        |_, now, settings| now.pressure_pa = settings.limits.pressure_pa + 1.0,
+        |_, now, settings| now.force_n = settings.limits.force_n + 1.0,
+        |_, now, settings| now.stroke_m = settings.limits.stroke_max_m + 1.0,
+        |seen, _, settings| seen.speed_m_per_s = settings.limits.speed_m_per_s + 1.0,
+    ];
+    for (at, first) in over.iter().enumerate() {
+        for second in &over[at + 1..] {
+            let (mut bad, mut now) = (good, good.readings.unwrap_or_default());
+            first(&mut bad, &mut now, &settings);
+            second(&mut bad, &mut now, &settings);
+            (bad.readings, bad.expected_pa) = (Some(now), now.pressure_pa);
+            assert_eq!(all([bad, good].repeat(20), &settings), [], "{bad:?} beyond {limits:?}");
+            let found = all([bad, bad, good], &settings);
+            assert_eq!(found.len(), 2, "both are reported: {found:?}");
+        }
+    }
+    // Pressure in a vented muscle is more than the regulator's model says, too.
+    let empty = Seen { command: Command::VENT, ..still(0.0, 0.0, 0.0) };
+    let full = Seen { expected_pa: 0.0, command: Command::VENT, ..still(300e3, 0.0, 0.0) };
+    assert!(300e3 > settings.watch.vented_pa && 300e3 > settings.watch.follow_pa);
+    let before = vec![empty; settings.watch.vent_ticks as usize + 2];
+    assert_eq!(all([&before[..], &[full, empty].repeat(20)].concat(), &settings), []);
+    let found = all([&before[..], &[full; 300]].concat(), &settings);
+    for (fault, enough) in [
+        (Fault::NotVented, settings.watch.debounce_ticks),
+        (Fault::PressureNotFalling, settings.watch.follow_ticks),
+    ] {
+        let first = found.iter().find(|(_, finding)| finding.fault == fault).map(|(tick, _)| *tick);
+        assert_eq!(first, Some(settings.watch.vent_ticks + 2 + u32::from(enough)), "{fault:?}");
+    }
+}
