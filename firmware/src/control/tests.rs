@@ -15,6 +15,7 @@ mod ownership;
 mod recorded;
 mod refusals;
 mod tracking;
+mod valve_test;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };

@@ -1,0 +1,93 @@
+//! The test of regulator and dump valve before arming, to the tick.
+
+use super::*;
+use crate::control::arming::Arming;
+
+/// Pressure of the test, Pa.
+const TEST_PA: f32 = 40e3;
+
+/// Ticks in which the dump valve was closed and open during a test whose pressure is given by whether the valve is open.
+fn tried(change: impl FnOnce(&mut Settings), pressure_pa: fn(bool) -> f32) -> (u32, u32, Bench) {
+    let mut bench = Bench::new(|settings| {
+        settings.watch.valve_test_pa = TEST_PA;
+        settings.watch.follow_pa = 1e6;
+        change(settings);
+    });
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    let (mut closed, mut open) = (0, 0);
+    while bench.controller.arming != Arming::Idle {
+        let opened = matches!(bench.controller.arming, Arming::Dumping(_));
+        *(if opened { &mut open } else { &mut closed }) += 1;
+        bench.pass_with(1, |now, _| now.pressure_pa = pressure_pa(opened));
+    }
+    (closed, open, bench)
+}
+
+#[test]
+fn the_regulator_is_given_four_time_constants_and_at_most_half_a_second() {
+    let good = |open| if open { 0.0 } else { TEST_PA };
+    for (lag_s, line_s, ticks) in [(0.02, 0.0051, 101), (0.0051, 0.02, 101), (0.0, 0.0, 0), (0.1, 0.5, 500)] {
+        let change = |settings: &mut Settings| {
+            (settings.regulator.lag_s, settings.regulator.line_s) = (lag_s, line_s);
+        };
+        let (closed, open, bench) = tried(change, good);
+        assert_eq!((closed, open), (ticks + 1, 1), "{lag_s} s and {line_s} s");
+        assert_eq!((bench.controller.state(), bench.latched()), (State::Armed, None));
+    }
+}
+
+#[test]
+fn half_of_the_pressure_must_come_and_go_within_a_second_and_never_twice_of_it() {
+    let settled =
+        |settings: &mut Settings| (settings.regulator.lag_s, settings.regulator.line_s) = (0.0, 0.0);
+    let half = 0.5 * TEST_PA;
+    let fault = |bench: &Bench| {
+        bench.controller.faults().latched.map(|found| (found.fault, found.value, found.limit))
+    };
+    let failed = |value: f32, limit: f32| Some((Fault::ValveTest, value, limit));
+    let (closed, open, bench) = tried(settled, |_| (0.5 * TEST_PA).next_down());
+    assert_eq!((closed, open, fault(&bench)), (1_001, 0, failed(half.next_down(), half)));
+    let (closed, open, bench) = tried(settled, |_| 0.5 * TEST_PA);
+    assert_eq!((closed, open, fault(&bench)), (1, 1_001, failed(half, half)));
+    let (closed, open, bench) =
+        tried(settled, |open| if open { (0.5 * TEST_PA).next_down() } else { 2.0 * TEST_PA });
+    assert_eq!((closed, open, fault(&bench)), (1, 1, None), "up to twice of it");
+    assert_eq!(bench.controller.state(), State::Armed);
+    let most = 2.0 * TEST_PA;
+    let (closed, open, bench) = tried(settled, |_| (2.0 * TEST_PA).next_up());
+    assert_eq!((closed, open, fault(&bench)), (1, 0, failed(most.next_up(), most)));
+    let (_, _, bench) = tried(settled, |_| f32::NAN);
+    assert_eq!(bench.controller.state(), State::Fault, "a pressure that is no number");
+}
+
+#[test]
+fn the_command_of_the_test_is_what_the_regulator_makes_its_pressure_of() {
+    for (gain, offset_pa, most_pa, command_pa) in
+        [(2.0, 3e3, 600e3, 17e3), (0.5, 0.0, 600e3, 80e3), (0.5, 0.0, 30e3, 30e3), (1.0, 50e3, 600e3, 0.0)]
+    {
+        let mut bench = Bench::new(|settings| {
+            settings.watch.valve_test_pa = TEST_PA;
+            settings.regulator.gain = gain;
+            settings.regulator.offset_pa = offset_pa;
+            settings.regulator.command_max_pa = most_pa;
+        });
+        bench.pass(10);
+        assert_eq!(bench.controller.arm(OWNER), Ok(()));
+        bench.pass(1);
+        let sent = bench.last.sides[0];
+        assert_eq!((sent.pressure_pa, sent.vent), (command_pa, false), "gain {gain}, offset {offset_pa} Pa");
+    }
+}
+
+#[test]
+fn an_armed_device_disarms_itself_in_the_tick_after_its_time() {
+    let mut bench = Bench::new(|settings| settings.watch.armed_silence_ticks = 50);
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    bench.hears_host = false;
+    bench.pass(50);
+    assert_eq!(bench.controller.state(), State::Armed);
+    bench.pass(1);
+    assert_eq!(bench.controller.state(), State::Disarmed);
+}
