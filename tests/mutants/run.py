@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 from datetime import date
+from functools import cache
 from pathlib import Path
 
 from one_program import Program, Source, listed
@@ -89,7 +90,8 @@ def generated(begins, only_missed=False):
     kept = kept_outcomes(every)
     wanted = [one for begin in begins or [""] for one in every if one["file"].startswith(begin)]
     if only_missed:
-        wanted = [one for one in wanted if kept[one["name"]]["outcome"] in ("missed", "not judged")]
+        rest = lambda one: one["outcome"] == "not judged" or (one["outcome"] == "missed" and reason(one) is None)
+        wanted = [one for one in wanted if rest(kept[one["name"]])]
     print(f"{len(wanted)} changes to judge", flush=True)
     if wanted:
         program = Program(copied(), TARGET / "mutants-built", wanted)
@@ -134,18 +136,24 @@ def keep(kept):
     (RESULTS / "generated.json").write_text(json.dumps(list(kept.values()), indent=1) + "\n")
 
 
+@cache
+def accepted():
+    return tomllib.loads((HERE / "equivalent.toml").read_text())["mutant"]
+
+
+def reason(mutant):
+    """Why nothing could notice a change; none where it is not in the list."""
+    lines = [" ".join(mutant[line].split()) for line in ("text", "becomes")]
+    fits = lambda one: (one["file"], one["change"]) == (mutant["file"], mutant["change"]) and one["text"] in lines
+    return next((one["reason"] for one in accepted() if fits(one)), None)
+
+
 def page():
     """Writes the page of the book."""
     removed_checks = json.loads((RESULTS / "removed.json").read_text())
     kept = RESULTS / "generated.json"
     mutants = json.loads(kept.read_text()) if kept.exists() else []
-    accepted = tomllib.loads((HERE / "equivalent.toml").read_text()).get("mutant", [])
     hashes = {file: code_hash((ROOT / file).read_text()) for file in {one["file"] for one in mutants}}
-
-    def reason(mutant):
-        """Why nothing could notice a change; none where it is not in the list."""
-        fits = lambda one: (one["file"], one["change"]) == (mutant["file"], mutant["change"]) and one["text"] in (mutant["text"], mutant["becomes"])
-        return next((one["reason"] for one in accepted if fits(one)), None)
 
     def is_judged(mutant):
         return mutant["outcome"] != "not judged" and mutant["code"] == hashes[mutant["file"]]

@@ -82,8 +82,10 @@ fn a_tick_that_is_let_pass_is_one_in_which_nothing_is_found_and_leaves_the_same(
                 looked += 1;
             }
             found += findings.len();
-            // As text, in which what is not a number is the same as itself.
-            assert_eq!(format!("{quick:?}"), format!("{whole:?}"), "after {seen:?}");
+            // As text, in which what is not a number is the same as itself, but only where it must: it takes longer than all else.
+            if quick != whole {
+                assert_eq!(format!("{quick:?}"), format!("{whole:?}"), "after {seen:?}");
+            }
         }
     }
     assert!(passed > 30_000 && looked > 30_000 && found > 1_000, "{passed} {looked} {found}");
