@@ -14,6 +14,7 @@ mod joint;
 mod ownership;
 mod recorded;
 mod refusals;
+mod silences;
 mod tracking;
 mod valve_test;
 
