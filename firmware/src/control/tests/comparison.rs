@@ -9,7 +9,7 @@ use crate::health::BLOCK_TICKS;
 /// Pressure at which the table's force is large enough to be compared, Pa.
 const STANDS_PA: f32 = 300e3;
 
-/// Blocks of the comparison of each muscle after three blocks' time, in which pressure stands in both, whatever is commanded.
+/// Blocks of the comparison of each muscle after three blocks of time, both under pressure whatever is commanded.
 fn blocks(fitted: bool, prepare: impl FnOnce(&mut Controller)) -> [u32; 2] {
     let mut bench = Bench::new(|settings| {
         settings.watch.follow_pa = 1e6;

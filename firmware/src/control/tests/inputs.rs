@@ -100,6 +100,12 @@ fn supply_air_below_its_least_pressure_is_a_fault_from_arming_on() {
     assert_eq!(missing.controller.arm(OWNER), Ok(()));
     missing.pass(1);
     assert_eq!(missing.latched(), Some(Fault::SupplyPressureLow));
+    // Without a least pressure no reading is too low, not even that of an input that is not connected.
+    for supply_air in [None, Some(-1.0), Some(f32::NAN)] {
+        let mut unwatched = Bench::running(|_| ());
+        unwatched.pass_with(300, |_, inputs| inputs.supply_air = supply_air);
+        assert_eq!(unwatched.latched(), None, "{supply_air:?}");
+    }
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn half_of_the_pressure_must_come_and_go_within_a_second_and_never_twice_of_it()
     let (closed, open, bench) = tried(settled, |_| (2.0 * TEST_PA).next_up());
     assert_eq!((closed, open, fault(&bench)), (1, 0, failed(most.next_up(), most)));
     let (_, _, bench) = tried(settled, |_| f32::NAN);
-    assert_eq!(bench.controller.state(), State::Fault, "a pressure that is no number");
+    assert_eq!(bench.controller.state(), State::Fault, "a pressure that is not a number");
 }
 
 #[test]
