@@ -4,6 +4,7 @@ use super::*;
 
 mod boundaries;
 mod calm;
+mod calm_limits;
 
 fn good() -> Seen {
     Seen {
