@@ -245,3 +245,35 @@ fn a_start_after_the_watchdog_or_a_brown_out_is_a_latched_fault() {
         assert_eq!(latched, fault, "{started_by:?}");
     }
 }
+
+#[test]
+fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
+    let work = |shared: &Shared, by: f32| {
+        shared.with(|controller| {
+            let model = controller.model_mut(Side::Agonist).expect("a table");
+            let mut worked = *model.chain.memories().next().expect("an effect").1;
+            worked[0] += by;
+            model.chain.restore(0, &worked);
+        });
+        memory(shared)
+    };
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &remembering()).is_ok());
+    pass(&shared, 10, &mut 0.0);
+    let worked = work(&shared, 0.011);
+    server.keep(&shared);
+    let mut server = again(server, &shared);
+    assert_eq!(memory(&shared), worked, "kept at rest");
+    // So often that it is no longer written at rest, but before a restart that is requested.
+    for _ in 0..40 {
+        work(&shared, 0.001);
+        server.keep(&shared);
+    }
+    let last = memory(&shared);
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.restart(&(), &mut ()), Ok(()));
+    let server = again(server, &shared);
+    assert_eq!(memory(&shared), last, "kept before a restart");
+    drop(server);
+}
