@@ -265,7 +265,7 @@ fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
     server.keep(&shared);
     let mut server = again(server, &shared);
     assert_eq!(memory(&shared), worked, "kept at rest");
-    // So often that it is no longer written at rest, but before a restart that is requested.
+    // The allowance of writes is used up at rest; a restart that is requested writes all the same.
     for _ in 0..40 {
         work(&shared, 0.001);
         server.keep(&shared);
