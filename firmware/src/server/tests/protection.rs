@@ -277,3 +277,32 @@ fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
     assert_eq!(memory(&shared), last, "kept before a restart");
     drop(server);
 }
+
+#[test]
+fn kept_settings_come_into_force_at_a_start_and_those_that_cannot_be_used_are_not_trusted() {
+    let latched = |shared: &Shared| shared.with(|c| c.faults().latched.map(|report| report.fault));
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert_eq!(
+        server.store.settings(&mut Settings::default()),
+        Ok(Kept::Whole),
+        "a new device keeps its own"
+    );
+    assert_eq!(latched(&shared), None);
+    let mut settings = Settings::default();
+    settings.limits.force_n *= 0.5;
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.set_settings(&settings, &mut Settings::default()), Ok(()));
+    let shared = Shared::new(Settings::default());
+    let mut server = again(server, &shared);
+    assert_eq!(shared.with(|controller| *controller.settings()), settings);
+    assert_eq!(latched(&shared), None);
+    let mut unusable = settings;
+    unusable.regulator.gain = f32::NAN;
+    assert_eq!(server.store.put_settings(&mut unusable), Ok(()));
+    let shared = Shared::new(Settings::default());
+    let server = again(server, &shared);
+    assert_eq!(latched(&shared), Some(Fault::SettingsInvalid));
+    assert!(shared.with(|controller| controller.settings().regulator.gain.is_finite()));
+    drop(server);
+}
