@@ -162,8 +162,11 @@ class Program:
         messages = [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
         if run.returncode == 0:
             built = {one["target"]["name"]: one["executable"] for one in messages if one.get("executable")}
-            # Copies, so that another build does not replace what runs.
-            self.tests = {name: shutil.copy(path, self.place / f"{name}-tests") for name, path in built.items()}
+            # Copies, so that another build does not replace what runs. A program that still runs cannot be written to.
+            for name, path in built.items():
+                self.tests[name] = self.place / f"{name}-tests"
+                self.tests[name].unlink(missing_ok=True)
+                shutil.copy(path, self.tests[name])
             return None
         wrong, words = [], [run.stderr[-3000:]]
         for one in messages:
