@@ -132,9 +132,10 @@ impl Problem {
         smoothing: Smoothing,
         steps: usize,
     ) -> Vec<f64> {
-        let penalty = self.penalty(start, weights, smoothing);
+        let data = self.design.normal(start, weights);
+        let penalty = self.design.penalty(&data, smoothing.elastic, smoothing.friction);
         let mut parameters = start.to_vec();
-        self.design.solve(&mut parameters, weights, &penalty, steps);
+        self.design.solve_from(data, &mut parameters, weights, &penalty, steps);
         parameters
     }
 }
