@@ -71,7 +71,7 @@ pub(super) fn solve(
     Ok(Solution { warnings, ..choice.solution })
 }
 
-/// What is left of a campaign for the search.
+/// What the search needs of a campaign.
 struct Cut {
     points: Points,
     clips: (Option<Clip>, Option<Clip>),

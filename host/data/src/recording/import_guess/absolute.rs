@@ -16,7 +16,7 @@ const SLACK: f64 = 0.03;
 /// Where the highest pressure is this many times the lowest, the lowest is no tested level.
 const FAR_ABOVE: f64 = 2.0;
 
-/// Asks whether the pressure is absolute where its lowest readings are those of the atmosphere, and the muscle is slack there at the
+/// Adds the question if the pressure is absolute where its lowest readings are those of the atmosphere, and the muscle is slack there at the
 /// beginning, or the pressure is much higher later.
 pub(super) fn ask(sample: &Sample, guess: &mut Guess) {
     let readings = |quantity: Quantity| {

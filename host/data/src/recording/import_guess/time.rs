@@ -14,7 +14,7 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
     let is_time = |c: &SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == Quantity::Time);
     let stamped = |(n, c): &(usize, &SampleColumn)| !used[*n] && c.is_stamped();
     let all = || sample.columns.iter().enumerate();
-    // A column of dates may stand beside one of times of day: that named for the time is looked for first.
+    // A file may have a column of dates and one of times of day: that named for the time is looked for first.
     let found = all().filter(stamped).find(|(_, c)| is_time(c)).or_else(|| all().find(stamped));
     if let Some((n, column)) = found {
         used[n] = true;

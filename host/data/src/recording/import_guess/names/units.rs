@@ -160,7 +160,7 @@ const FROM_ATMOSPHERE: &[&str] =
 
 /// The unit of that spelling, also with a mark of its zero.
 pub(in super::super) fn unit(text: &str) -> Option<UnitSpelling> {
-    // Two signs look alike: micro, and the Greek letter.
+    // Two signs look the same: micro, and the Greek letter.
     let text = text.trim().replace('\u{3bc}', "µ");
     let marked = |marks: &[&str], absolute: bool| {
         let pressures = marks.iter().filter_map(|mark| plain(before(&text, mark)?));
