@@ -145,6 +145,7 @@ fn keep_fit(
         uncertainty: Some(fitted.stored_uncertainty()),
         corrections: Vec::new(),
         mountings: table_file::stored_mountings(&fitted.solution.problem),
+        earlier_load: None,
     };
     match (TableFile { table: fitted.table.clone(), about }).to_bytes() {
         Ok(bytes) => result.files.push(("table.pam".into(), bytes)),

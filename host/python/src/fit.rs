@@ -44,6 +44,7 @@ impl Fit {
             fit: self.fit.summary.quality(),
             uncertainty: Some(self.fit.stored_uncertainty()),
             mountings: table_file::stored_mountings(&self.fit.solution.problem),
+            earlier_load: None,
             ..About::default()
         };
         Table(TableFile { table: self.fit.table.clone(), about })

@@ -119,6 +119,7 @@ impl Arguments {
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
             mountings: table_file::stored_mountings(&fitted.solution.problem),
+            earlier_load: None,
         };
         let table = TableFile { table: fitted.table.clone(), about };
         let json = serde_json::to_string_pretty(&fitted.summary)

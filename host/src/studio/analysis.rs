@@ -282,6 +282,7 @@ impl Analysis {
             uncertainty: Some(fitted.stored_uncertainty()),
             corrections: Vec::new(),
             mountings: table_file::stored_mountings(&fitted.solution.problem),
+            earlier_load: None,
         };
         let path = self.free("fitted", "pam");
         TableFile { table: fitted.table.clone(), about }.write(&path)?;
