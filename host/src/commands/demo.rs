@@ -13,6 +13,7 @@ use crate::console::Console;
 use crate::demo::campaign::{Made, record};
 use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
+use crate::documents::recording::Run;
 use crate::documents::{bench, text};
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
@@ -20,7 +21,8 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::progress::Progress;
 use pam_device::emulated::{Emulated, Kind, Stand};
-use pam_device::recorder::{Recorder, about_losses, about_start};
+use pam_device::recorder::{self, Ended, Recorder};
+use pam_device::run::Ending;
 use pam_device::{Client, regulator, tables};
 use pam_fit::Fit;
 use pam_fit::predict::predict;
@@ -218,13 +220,12 @@ impl Arguments {
 
     fn keep(&self, client: &mut Client, track: &Track) -> Result<PathBuf> {
         let path = self.output.join(format!("run-{}-{}.csv", track.law.key(), track.task.name()));
-        let mut about = about_start("pam-run/1", client)?;
+        let mut about = Run::watched(recorder::About::of("pam-run/1", client)?);
         let mut recorder = Recorder::create(std::slice::from_ref(&path), &about)?;
         for sample in &track.samples {
             recorder.push(sample)?;
         }
-        about["losses"] = about_losses(client.losses());
-        about["ended_by"] = "time".into();
+        about.ended = Some(Ended::of(&Ok(Ending::Done), client.losses()));
         recorder.finish(&about)
     }
 }
