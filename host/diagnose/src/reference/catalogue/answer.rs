@@ -201,7 +201,7 @@ fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
             .collect(),
         confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
         since: since(cells, &accepted.fit),
-        owner: about.owner,
+        owner: about.changed.owner,
         correction: accepted.fit.change.is_bench(),
         rms_N: rms(&accepted.fit.trace),
     }
