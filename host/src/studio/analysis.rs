@@ -19,7 +19,7 @@ use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Hashes, Reader, Recording};
-use pam_fit::table_file::{self, About, TableFile};
+use pam_fit::table_file;
 use pam_fit::{Options, fit};
 use pam_report::{diagnose_page, fit_page};
 
@@ -271,18 +271,11 @@ impl Analysis {
         let (muscle, campaign, files, hashes) = self.read(muscle)?;
         let options = Options::default();
         let fitted = fit(&campaign, &muscle, &options)?;
-        let about = About {
-            muscle: muscle.name.clone(),
-            date: date::now_utc(),
-            tool: format!("host {} studio", env!("CARGO_PKG_VERSION")),
-            sources: table_file::sources(&campaign, &files, hashes),
-            fit: fitted.summary.quality(),
-            uncertainty: Some(fitted.stored_uncertainty()),
-            corrections: Vec::new(),
-            mountings: table_file::stored_mountings(&fitted.solution.problem),
-        };
+        let mut table = fitted.table_file(format!("host {} studio", env!("CARGO_PKG_VERSION")));
+        table.about.date = date::now_utc();
+        table.about.sources = table_file::sources(&campaign, &files, hashes);
         let path = self.free("fitted", "pam");
-        TableFile { table: fitted.table.clone(), about }.write(&path)?;
+        table.write(&path)?;
         let lines = lines(&campaign, &fitted.table)?;
         let html = fit_page::page(&fitted, &campaign, &options).html();
         let name = report_name()?;
