@@ -44,11 +44,11 @@ pub(crate) struct Run {
     pub about: About,
     /// Absent where the live view or the demonstration records.
     #[serde(flatten)]
-    pub asked: Option<Asked>,
+    pub request: Option<RunRequest>,
     /// Absent until the recording has ended.
     #[serde(flatten)]
     pub ended: Option<Ended>,
-    /// Absent as [`Self::asked`] and [`Self::ended`].
+    /// Absent as [`Self::request`] and [`Self::ended`].
     #[serde(flatten)]
     pub outcome: Option<RunOutcome>,
 }
@@ -56,13 +56,13 @@ pub(crate) struct Run {
 impl Run {
     /// Of a recording without an order of its own, as it begins.
     pub(crate) fn watched(about: About) -> Self {
-        Self { about, asked: None, ended: None, outcome: None }
+        Self { about, request: None, ended: None, outcome: None }
     }
 }
 
-/// What a run was asked for.
+/// The request of a run.
 #[derive(Debug, Serialize)]
-pub(crate) struct Asked {
+pub(crate) struct RunRequest {
     pub mode: &'static str,
     pub setpoint_profile: Option<String>,
     /// Of the joint; null but for an angle.

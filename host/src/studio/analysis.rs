@@ -373,7 +373,7 @@ mod tests {
         analysis.upload("../../etc/x.csv", pieces(text.as_bytes())).unwrap();
         let names: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(names, ["1-_.._etc_x.csv"]);
-        assert_eq!(analysis.curves(0).unwrap()["rows"], 20);
+        assert_eq!(analysis.curves(0).unwrap().rows, 20);
         assert!(analysis.curves(1).is_err());
         assert!(analysis.fit("name = 1").is_err());
     }
@@ -382,21 +382,21 @@ mod tests {
     fn the_table_and_the_report_of_one_fit_belong_together() {
         let folder = tempfile::tempdir().unwrap();
         let analysis = Analysis::new(folder.path().to_owned()).unwrap();
-        let muscle = analysis.example("mini").unwrap()["muscle"].as_str().unwrap().to_owned();
+        let muscle = analysis.example("mini").unwrap().muscle.unwrap();
         let (one, other) = std::thread::scope(|scope| {
             let one = scope.spawn(|| analysis.fit(&muscle).unwrap());
             let other = scope.spawn(|| analysis.fit(&muscle).unwrap());
             (one.join().unwrap(), other.join().unwrap())
         });
-        assert_ne!(one["table"], other["table"]);
-        assert_ne!(one["report"], other["report"]);
+        assert_ne!(one.table, other.table);
+        assert_ne!(one.report, other.report);
         let last = analysis.table().unwrap();
         for fit in [&one, &other] {
-            let table = fit["table"].as_str().unwrap();
-            assert!(TableFile::read(table).is_ok());
+            let table = fit.table.as_str();
+            assert!(table_file::TableFile::read(table).is_ok());
             // Only what was fitted last can be sent, and only under its own name.
             assert_eq!(analysis.table_named(table).is_ok(), last.as_os_str() == table);
-            let name = fit["report"].as_str().unwrap().strip_prefix("/report/").unwrap();
+            let name = fit.report.strip_prefix("/report/").unwrap();
             assert_eq!(name.len(), 32);
             assert!(analysis.report(name).unwrap().contains("<html"));
         }

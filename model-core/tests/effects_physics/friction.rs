@@ -1,12 +1,12 @@
 //! Friction: of reversals, rests, speed and pressure.
 
-use model_core::effects::{BraidTravel, Context, EffectName, Link, MEMORY, Memory};
+use model_core::effects::{BraidTravel, Context, EffectName, Link, MEMORY};
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
 use model_core::table;
 use model_core::units::Pressure;
 
-use super::{Alone, close, held, moment};
+use super::{Alone, close, moment};
 
 /// The strands' travel without the pressure's part.
 fn travelled(alone: &mut Alone, from: f64, to: f64, direction: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! An orthonormal basis of columns.
 
-use super::products::{Stretch, add_all, dot, products};
+use super::products::{Stretch, add_all, energy, products};
 use crate::criteria::baseline::DEPENDENT_COLUMN;
 
 /// A unit vector that is zero outside a stretch of rows.

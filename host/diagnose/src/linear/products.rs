@@ -47,8 +47,8 @@ pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
 /// Part of a column: its values from a row on, zero elsewhere.
 #[derive(Clone, Copy)]
 pub(crate) struct Stretch<'a> {
-    from: usize,
-    values: &'a [f64],
+    pub(super) from: usize,
+    pub(super) values: &'a [f64],
 }
 
 impl<'a> Stretch<'a> {

@@ -1,5 +1,5 @@
-//! The changes that can be named. What an effect's change is called, whose it is and what it is mistaken for stands in the effect's
-//! own file; here is what each settled change does to the force.
+//! The changes that can be named, and what each settled change does to the force. Class, owner and law of a change are in the file of its
+//! effect.
 
 use model_core::effects::{Changed, EffectName, Info, Traits};
 use pam_fit::bench::{BenchName, Candidate};

@@ -19,7 +19,7 @@ use super::tracking_error::TrackingError;
 use crate::change_watch::{self, ChangeWatch};
 use crate::commands::recording_files::{begin, end, warn_of_losses};
 use crate::console::Console;
-use crate::documents::recording::{Asked, Run, RunOutcome};
+use crate::documents::recording::{Run, RunOutcome, RunRequest};
 use crate::progress::ProgressLine;
 
 /// Share of a run in saturation from which it is reported: a step exceeds the limits for a moment without harm.
@@ -79,7 +79,7 @@ impl Session {
         let every_ticks =
             arguments.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
         let mut about = Run::watched(About::of("pam-run/1", client)?);
-        about.asked = Some(Asked {
+        about.request = Some(RunRequest {
             mode: messages::mode(quantity.mode()),
             setpoint_profile: arguments.quantity.text().map(str::to_owned),
             stiffness_Nm_per_rad: arguments.stiffness.map(f64::from),

@@ -1,4 +1,4 @@
-//! What is left of an effect after a base model is refitted: the part that a diagnosis can see.
+//! The residual of an effect after a base model is refitted: the part that a diagnosis can see.
 
 use nalgebra::{DMatrix, DVector};
 use virtual_bench::friction::BraidFriction;
