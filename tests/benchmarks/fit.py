@@ -7,6 +7,7 @@
    this project on the same points; the minimisers as they come, and to within a hundredth of the least objective. Then this
    project's joint fit of the same 600 points, which finds P0 too.
 2. `host fit` of ROWS rows from file to table, beside polars reading the file; a tenth and a hundredth of the rows, too.
+3. The same for short loops with outliers that repeat to the end of the file.
 
 Builds what it needs. Programs run in turn, several times; the least counts.
 """
@@ -137,6 +138,13 @@ def large(folder: Path, program: Path, most: int) -> tuple[list[str], list[Bound
         Bound("the same in processor time", fit.processor / polars.processor, 2.5),
         Bound("memory of the whole fit, MB", fit.memory, 1000),
         *linear(costs, "host fit, whole"),
+    ]
+    repeated = {}
+    lines += ["", "## Repeated loops with outliers", "", *table(programs, most, repeated, "repeated")]
+    fit, polars = repeated[most]["host fit, whole"], repeated[most]["polars, reading only"]
+    bounds += [
+        Bound("repeated loops, processor time, times polars's reading", fit.processor / polars.processor, 2.5),
+        Bound("repeated loops, memory, MB", fit.memory, 1000),
     ]
     return lines, bounds
 

@@ -69,9 +69,9 @@ def peer(module: str, path: Path) -> tuple[list[str], bool]:
     return ([sys.executable, "-c", PEER.format(module), str(path)], True)
 
 
-def make(path: Path, rows: int) -> float:
+def make(path: Path, rows: int, *kind: str) -> float:
     """A recording; its size in MB."""
-    subprocess.run([sys.executable, HERE / "muscle.py", path, str(rows)], check=True)
+    subprocess.run([sys.executable, HERE / "muscle.py", path, str(rows), *kind], check=True)
     return path.stat().st_size / 1e6
 
 
@@ -113,15 +113,15 @@ class Bound:
 COSTS = ["| rows | file | program | wall | processor | memory |", "| ---: | ---: | --- | ---: | ---: | ---: |"]
 
 
-def table(programs, most: int, costs: dict[int, dict[str, Cost]]):
+def table(programs, most: int, costs: dict[int, dict[str, Cost]], *kind: str):
     """Runs programs on recordings of 1 %, 10 %, and 100 % of `most` rows: a line of the page for each, and its cost in `costs`.
 
-    `programs` makes them for a file."""
+    `programs` makes them for a file, and `kind` is that of the recordings."""
     yield from COSTS
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "loops.csv"
         for rows in (most // 100, most // 10, most):
-            size = make(path, rows)
+            size = make(path, rows, *kind)
             costs[rows] = rounds(programs(path), 5)
             for name, c in costs[rows].items():
                 line = f"| {rows:,} | {size:.0f} MB | {name} | {c.wall:.3f} s | {c.processor:.2f} s | {c.memory:.0f} MB |"

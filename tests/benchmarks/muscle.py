@@ -1,6 +1,7 @@
 """The thesis's miniature muscle in NumPy, and recordings of it.
 
-    python3 muscle.py PATH ROWS     writes one CSV of triangular loops at six pressures, with friction and noise
+    python3 muscle.py PATH ROWS             writes one CSV of triangular loops at six pressures, with friction and noise
+    python3 muscle.py PATH ROWS repeated    the same, of short loops at 40 Hz that repeat to the end, with outliers
 """
 
 import sys
@@ -47,6 +48,26 @@ def stroke(p):
     return TOP * (p - P0) / (LEVELS[-1] - P0)
 
 
+def loop(p, n):
+    """Stroke and force without noise of `n` rows: three strokes there and back at a pressure."""
+    u = np.linspace(0, 3, n, endpoint=False) % 1.0
+    x = (1 - np.abs(1 - 2 * u)) * stroke(p)
+    way = np.where(u < 0.5, 1.0, -1.0)
+    friction = 0.14 - 0.093 * (p - 207e3) / 345e3
+    return x, quasi(p, x) * (1 - friction * way)
+
+
+def columns(rng, time, p, x, force):
+    """The columns of a recording, with the noise of its sensors."""
+    n = len(time)
+    return {
+        "time_s": np.round(time, 3),
+        "pressure_kPa": np.round((p + 300 * rng.standard_normal(n)) / 1e3, 5),
+        "displacement_mm": np.round(1e3 * x + 2e-3 * rng.standard_normal(n), 7),
+        "force_N": np.round(force + 0.05 * rng.standard_normal(n), 7),
+    }
+
+
 def write(path: Path, rows: int) -> None:
     import polars as pl
 
@@ -55,22 +76,26 @@ def write(path: Path, rows: int) -> None:
     sizes[: rows % 6] += 1
     blocks, start = [], 0.0
     for p, n in zip(LEVELS, sizes):
-        u = np.linspace(0, 3, n, endpoint=False) % 1.0
-        x = (1 - np.abs(1 - 2 * u)) * stroke(p)
-        way = np.where(u < 0.5, 1.0, -1.0)
-        friction = 0.14 - 0.093 * (p - 207e3) / 345e3
         time = start + np.arange(n) * 1e-3
         start = time[-1] + 60
-        blocks.append(
-            {
-                "time_s": np.round(time, 3),
-                "pressure_kPa": np.round((p + 300 * rng.standard_normal(n)) / 1e3, 5),
-                "displacement_mm": np.round(1e3 * x + 2e-3 * rng.standard_normal(n), 7),
-                "force_N": np.round(quasi(p, x) * (1 - friction * way) + 0.05 * rng.standard_normal(n), 7),
-            }
-        )
+        blocks.append(columns(rng, time, p, *loop(p, n)))
     pl.concat([pl.DataFrame(b) for b in blocks]).write_csv(path)
 
 
+def write_repeated(path: Path, rows: int) -> None:
+    """Six loops of 3000 rows each, one after another until the file is full: time goes on, and the pressure jumps where a loop begins.
+    One reading of the force in a thousand is an outlier."""
+    import polars as pl
+
+    rng = np.random.default_rng(3)
+    size = 3000
+    loops = [loop(p, size) for p in LEVELS]
+    times = -(-rows // (size * len(LEVELS)))
+    x, force = (np.tile(np.concatenate(c), times)[:rows] for c in zip(*loops))
+    p = np.tile(np.repeat(LEVELS, size), times)[:rows]
+    force = force + np.where(rng.random(rows) < 1e-3, 20 * rng.standard_normal(rows), 0)
+    pl.DataFrame(columns(rng, 0.025 * np.arange(rows), p, x, force)).write_csv(path)
+
+
 if __name__ == "__main__":
-    write(Path(sys.argv[1]), int(sys.argv[2]))
+    (write_repeated if sys.argv[3:] == ["repeated"] else write)(Path(sys.argv[1]), int(sys.argv[2]))

@@ -68,6 +68,80 @@ pub fn in_text(text: &str) -> Option<f64> {
     })
 }
 
+/// A time stamp, s: of a date with a time of day since 1970, of a time of day alone since midnight. Dates are those of ISO 8601
+/// (`2026-11-21T13:30:00.25Z`, also with a blank, and with an offset such as `+01:00`) or `21.11.2026`; a month before the day is
+/// ambiguous. `None` for any other text.
+///
+/// ```
+/// use pam_data::date::time_stamp;
+/// assert_eq!(time_stamp("2026-11-21 01:30:00.25"), Some(1_795_219_200.0 + 5400.25));
+/// assert_eq!(time_stamp("2026-11-21T01:30:00+01:00"), Some(1_795_219_200.0 + 1800.0));
+/// assert_eq!(time_stamp("21.11.2026 01:30:00,5"), Some(1_795_219_200.0 + 5400.5));
+/// assert_eq!(time_stamp("13:30:00.5"), Some(48_600.5));
+/// assert_eq!(time_stamp("11/21/2026 13:30"), None);
+/// ```
+#[must_use]
+pub fn time_stamp(text: &str) -> Option<f64> {
+    let text = text.trim().as_bytes();
+    let iso = |text| {
+        let (year, rest) = number(text, 4)?;
+        let (month, rest) = number(rest.strip_prefix(b"-")?, 2)?;
+        let (day, rest) = number(rest.strip_prefix(b"-")?, 2)?;
+        Some((year, month, day, rest))
+    };
+    let german = |text| {
+        let (day, rest) = number(text, 2)?;
+        let (month, rest) = number(rest.strip_prefix(b".")?, 2)?;
+        let (year, rest) = number(rest.strip_prefix(b".")?, 4)?;
+        Some((year, month, day, rest))
+    };
+    let Some((year, month, day, rest)) = iso(text).or_else(|| german(text)) else {
+        return time_with_parts(text).filter(|(_, rest)| rest.is_empty()).map(|(seconds, _)| seconds);
+    };
+    let real = (1970..2100).contains(&year)
+        && (1..=12).contains(&month)
+        && (1..=days_of(year, month)).contains(&day);
+    let (b' ' | b'T' | b't', rest) = rest.split_first()? else { return None };
+    let (seconds, rest) = time_with_parts(rest.trim_ascii_start())?;
+    let offset = offset_of_zone(rest.trim_ascii())?;
+    real.then(|| seconds_since_1970(year, month, day) as f64 + seconds - offset)
+}
+
+/// A time of day with parts of a second, s, and what follows it.
+fn time_with_parts(bytes: &[u8]) -> Option<(f64, &[u8])> {
+    let (hour, rest) = number(bytes, 2)?;
+    let (minute, rest) = number(rest.strip_prefix(b":")?, 2)?;
+    let Some(rest) = rest.strip_prefix(b":") else {
+        return (hour < 24 && minute < 60).then_some(((3600 * hour + 60 * minute) as f64, rest));
+    };
+    let (second, rest) = number(rest, 2)?;
+    if hour > 23 || minute > 59 || second > 59 {
+        return None;
+    }
+    let whole = (3600 * hour + 60 * minute + second) as f64;
+    let (b'.' | b',', parts) = rest.split_first().unwrap_or((&b' ', rest)) else {
+        return Some((whole, rest));
+    };
+    let digits = parts.iter().take_while(|b| b.is_ascii_digit()).count();
+    let parts_of_second = std::str::from_utf8(&parts[..digits]).ok()?;
+    let share: f64 = format!("0.{parts_of_second}0").parse().ok()?;
+    Some((whole + share, &parts[digits..]))
+}
+
+/// The offset of a time zone from UTC, s: nothing, `Z`, `+01:00`, `-0500`, `+01`.
+fn offset_of_zone(bytes: &[u8]) -> Option<f64> {
+    let (sign, rest) = match bytes.split_first() {
+        None => return Some(0.0),
+        Some((b'Z' | b'z', [])) => return Some(0.0),
+        Some((b'+', rest)) => (1.0, rest),
+        Some((b'-', rest)) => (-1.0, rest),
+        Some(_) => return None,
+    };
+    let (hours, rest) = number(rest, 2)?;
+    let (minutes, rest) = if rest.is_empty() { (0, rest) } else { number(after(rest, b":"), 2)? };
+    (hours < 15 && minutes < 60 && rest.is_empty()).then_some(sign * (3600 * hours + 60 * minutes) as f64)
+}
+
 /// A number of `n` digits at the beginning, and what follows.
 fn number(bytes: &[u8], digits: usize) -> Option<(u64, &[u8])> {
     let (own, rest) = bytes.split_at_checked(digits)?;

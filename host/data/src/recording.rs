@@ -45,7 +45,7 @@ pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;
 pub use import::{Import, Missing};
-pub use mountings::{Rest, SAME_LENGTH, VENTING};
+pub use mountings::{Preceding, Rest, SAME_LENGTH, VENTING};
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};
 pub use read::{Hashes, Reader};

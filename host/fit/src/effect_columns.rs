@@ -38,7 +38,9 @@ pub fn effect_columns(
         let recording = with_true_length(file, recording);
         let mut motions = follower.follow(&recording, &motion, campaign.pause_before(index));
         if let Some(rest) = rests.as_ref().and_then(|rests| rests.get(index)) {
-            for context in vented_rest::contexts(&muscle, &mut motions, rest) {
+            for context in
+                vented_rest::contexts(&muscle, &mut motions, rest, file.about.earlier_load.as_ref())
+            {
                 effect.step(&parameters, &context, &mut memory);
             }
         }

@@ -2,7 +2,7 @@
 //!
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
 //! of known length the memories fade as they do in time; an unknown pause counts as a minute. Between recordings at held lengths the
-//! muscle is vented ([`crate::vented_rest`]); a new mounting starts the memories of its load anew.
+//! muscle is vented ([`crate::vented_rest`]), and for longer where it is mounted anew.
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -116,7 +116,8 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
         } else {
             let mut motions = follower.follow(recording, &motion, campaign.pause_before(index));
             if let Some(rest) = rests.as_ref().and_then(|rests| rests.get(index)) {
-                for context in vented_rest::contexts(&model.muscle, &mut motions, rest) {
+                let earlier = file.about.earlier_load.as_ref();
+                for context in vented_rest::contexts(&model.muscle, &mut motions, rest, earlier) {
                     model.chain.step(&context);
                 }
             }

@@ -17,6 +17,7 @@ use sha2::{Digest, Sha256};
 
 use crate::fit::dimensions::Mounting;
 use crate::fit::problem::Problem;
+use crate::vented_rest::EarlierLoad;
 use pam_data::bounds;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
@@ -24,8 +25,12 @@ use pam_data::output::write_whole;
 use pam_data::recording::Campaign;
 
 const MAGIC: [u8; 4] = *b"PAMF";
-/// The version that is written, and the only one read.
-pub const VERSION: u16 = 2;
+/// The version that is written.
+pub const VERSION: u16 = 3;
+/// The version before, which is read too: it lacks the last field, [`About::earlier_load`].
+const WITHOUT_EARLIER_LOAD: u16 = 2;
+/// The last field where there is none, as postcard writes it.
+const NONE: u8 = 0;
 const HEADER: usize = 12;
 const CHECKSUM: usize = 4;
 /// A file that announces more is not read: no table comes near it.
@@ -59,6 +64,8 @@ pub struct About {
     pub corrections: Vec<Correction>,
     /// Mountings whose recordings were held at one length. `predict` adds the correction to recordings of the same mounting.
     pub mountings: Vec<StoredMounting>,
+    /// What the muscle had carried before the recordings of the fit. `predict` counts it before recordings at held lengths.
+    pub earlier_load: Option<EarlierLoad>,
 }
 
 /// A mounting whose recordings were held at one length.
@@ -168,9 +175,9 @@ impl TableFile {
                 .help("tables end in .pam and are written by `host fit` or `host diagnose`"));
         }
         let found = u16::from_le_bytes([bytes[4], bytes[5]]);
-        if found != VERSION {
+        if ![VERSION, WITHOUT_EARLIER_LOAD].contains(&found) {
             return Err(wrong(format!(
-                "the file has table format {found}, this program reads table format {VERSION}"
+                "the file has table format {found}, this program reads table formats {WITHOUT_EARLIER_LOAD} and {VERSION}"
             ))
             .help("use the version of the program that wrote it, or fit the muscle anew"));
         }
@@ -188,7 +195,11 @@ impl TableFile {
         if check::crc32(content) != stored {
             return Err(wrong("the file's checksum does not fit".into()).help(damaged));
         }
-        let (body, rest): (Body, &[u8]) = postcard::take_from_bytes(&content[HEADER..])
+        let mut content = content[HEADER..].to_vec();
+        if found == WITHOUT_EARLIER_LOAD {
+            content.push(NONE);
+        }
+        let (body, rest): (Body, &[u8]) = postcard::take_from_bytes(&content)
             .map_err(|e| wrong(format!("the file's content cannot be decoded: {e}")).help(damaged))?;
         if !rest.is_empty() {
             return Err(wrong("the file's content ends before its announced length".into()).help(damaged));
@@ -233,6 +244,12 @@ impl About {
         }
         if self.mountings.iter().any(|m| !m.stroke.is_finite() || !m.offset.is_finite()) {
             return wrong("a mounting's length is not finite");
+        }
+        if self
+            .earlier_load
+            .is_some_and(|l| [l.pressure, l.seconds].iter().any(|x| !(*x >= 0.0 && x.is_finite())))
+        {
+            return wrong("an earlier load that is no pressure and time");
         }
         if let Some(u) = &self.uncertainty {
             let expected = (u.rows as usize).checked_mul(u.columns as usize);
@@ -325,6 +342,28 @@ mod tests {
     fn a_device_that_never_ends_is_no_table() {
         let error = TableFile::read("/dev/zero").expect_err("it never ends");
         assert_eq!(error.code(), DataCode::FileUnreadable);
+    }
+
+    #[test]
+    fn a_file_of_the_version_before_is_read() {
+        let mut bytes = example().to_bytes().expect("valid");
+        bytes.truncate(bytes.len() - CHECKSUM);
+        assert_eq!(bytes.pop(), Some(NONE), "the last field");
+        bytes[4..6].copy_from_slice(&WITHOUT_EARLIER_LOAD.to_le_bytes());
+        let length = (bytes.len() - HEADER) as u32;
+        bytes[8..12].copy_from_slice(&length.to_le_bytes());
+        let crc = check::crc32(&bytes);
+        bytes.extend_from_slice(&crc.to_le_bytes());
+        assert_eq!(TableFile::from_bytes(&bytes).expect("readable"), example());
+    }
+
+    #[test]
+    fn an_earlier_load_is_kept_and_checked() {
+        let mut file = example();
+        file.about.earlier_load = Some(EarlierLoad { pressure: 6e5, seconds: 100.0 });
+        assert_eq!(TableFile::from_bytes(&file.to_bytes().expect("valid")).expect("valid"), file);
+        file.about.earlier_load = Some(EarlierLoad { pressure: 6e5, seconds: f64::NAN });
+        assert!(TableFile::from_bytes(&file.to_bytes().expect("encoded")).is_err());
     }
 
     #[test]

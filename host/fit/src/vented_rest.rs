@@ -1,40 +1,74 @@
-//! The rest between recordings at held lengths, as memories of the load see it.
+//! The time before recordings at held lengths, as memories of the load see it.
 //!
-//! The muscle is vented in [`VENTING`] seconds, rests without pressure, and is filled from there to the first reading. Other recordings
-//! say nothing about the time between them.
+//! Between two recordings the muscle is vented in [`VENTING`] seconds, rests without pressure, and is filled from there to the first
+//! reading. Where it was mounted anew in between, it may have carried a load that nobody recorded ([`EarlierLoad`]). Recordings
+//! in motion say nothing about the time between them.
 
 use model_core::effects::{Context, EffectName, FittedEffect};
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
 use model_core::units::Pressure;
+use serde::{Deserialize, Serialize};
 
 use pam_data::pluralise::pluralise;
-use pam_data::recording::{Rest, VENTING};
+use pam_data::recording::{Preceding, Rest, VENTING};
 
-/// Whether an effect of a table asks for the rest between recordings.
+/// A load that nobody recorded: before the first recording of each mounting that follows another, the muscle was filled at that length.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct EarlierLoad {
+    /// To this pressure, Pa.
+    pub pressure: f64,
+    /// For this long, s.
+    pub seconds: f64,
+}
+
+/// The time in which a muscle is filled for an earlier load, s.
+const FILLING: f64 = 1.0;
+/// From the end of an earlier load to the first recording, s.
+const VENTED_BEFORE: f64 = 30.0;
+
+/// Whether an effect of a table asks for the time before recordings.
 #[must_use]
 pub fn matters(effects: &[FittedEffect]) -> bool {
     effects.iter().any(|e| e.effect == EffectName::BladderCreep)
 }
 
-/// The moments of the rest before a recording whose motions are given. The first of these then follows the rest, not the recording before.
-pub fn contexts(muscle: &Muscle<f64>, motions: &mut [Motion<f64>], rest: &Rest) -> Vec<Context<f64>> {
+/// The moments before a recording whose motions are given. The first of these then follows the rest, not the recording before.
+pub fn contexts(
+    muscle: &Muscle<f64>,
+    motions: &mut [Motion<f64>],
+    rest: &Rest,
+    earlier: Option<&EarlierLoad>,
+) -> Vec<Context<f64>> {
     let Some(first) = motions.first_mut() else { return Vec::new() };
     let venting = VENTING.min(0.5 * rest.seconds);
-    let resting = if rest.remounted { f64::INFINITY } else { rest.seconds - venting };
     first.dt = rest.lead;
-    let vented = Motion { speed: 0.0, acceleration: 0.0, pressure_rate: 0.0, resting: 1.0, ..*first };
-    let at = |dt: f64| muscle.context(&Motion { dt, ..vented }, Pressure::from_pascals(0.0));
-    vec![at(venting), at(resting)]
+    let held = Motion { speed: 0.0, acceleration: 0.0, pressure_rate: 0.0, resting: 1.0, ..*first };
+    let at =
+        |dt: f64, pressure: f64| muscle.context(&Motion { dt, ..held }, Pressure::from_pascals(pressure));
+    let mut moments = vec![at(venting, 0.0), at(rest.seconds - venting, 0.0)];
+    if let Some(load) = earlier.filter(|_| rest.after == Preceding::OtherMounting) {
+        moments.extend([at(FILLING, load.pressure), at(load.seconds, load.pressure)]);
+        moments.extend([at(VENTING, 0.0), at(VENTED_BEFORE, 0.0)]);
+    }
+    moments
 }
 
 /// What is assumed about rests that no clock tells.
 #[must_use]
 pub fn remark(rests: &[Rest]) -> Option<String> {
-    let mut assumed = rests.iter().filter(|r| !r.known && !r.remounted);
-    let seconds = assumed.next()?.seconds;
-    let pauses = pluralise(1 + assumed.count(), "pause");
-    Some(format!(
-        "the clock does not show {pauses} between recordings of one mounting: counted as {seconds} s without pressure"
-    ))
+    let assumed = |after: Preceding, what: &str| {
+        let mut of = rests.iter().filter(|r| !r.known && r.after == after);
+        let seconds = of.next()?.seconds;
+        Some(format!(
+            "{} {what}: counted as {seconds} s without pressure",
+            pluralise(1 + of.count(), "pause")
+        ))
+    };
+    let all = [
+        assumed(Preceding::SameMounting, "between recordings of one mounting"),
+        assumed(Preceding::OtherMounting, "between mountings"),
+    ];
+    let all: Vec<String> = all.into_iter().flatten().collect();
+    (!all.is_empty()).then(|| format!("the clock does not show {}", all.join(", nor ")))
 }

@@ -67,6 +67,7 @@ impl Arguments {
                 uncertainty: Some(found.uncertainty.clone()),
                 corrections: Vec::new(),
                 mountings: Vec::new(),
+                earlier_load: None,
             };
             let _turn = Turn::of([Some(path.as_path())])?;
             TableFile { table: found.table.clone(), about }.write(path)?;

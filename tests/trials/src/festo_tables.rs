@@ -10,7 +10,7 @@ pub const HEADING: &str = "## Unseen runs through the table";
 /// First paragraph of the section, and the head of its table.
 pub const INTRODUCTION: &str = "Each run is predicted from the others by a table file (`.pam`) and the prediction of `host predict`, which carries the \
     memory through all runs in order; of the predicted run only pressure and time are used. Of more than twelve runs every twelfth is left out together. \
-    \"Base\": the base model of `host fit` with the zero of the load cell. \"Static\": the same, with the contact of the bladder where the other runs follow it more closely. \"Memory\": `bladder-creep` in addition. Root mean square in percent \
+    \"Base\": the base model of `host fit` with the zero of the load cell. \"Static\": the same, with the contact of the bladder where the other runs follow it more closely. \"Memory\": `bladder-creep` in addition, and a load before the mountings that follow another where the other runs are predicted clearly better with one. Root mean square in percent \
     of the largest force, over readings that pull; readings that ring after a valve's pulse are set aside, and slack readings or those at \
     the converter's end count only by the pull that is predicted too much there. \"Change\" compares memory and the better one of base and static. \
     \"Supported\": the same, static and memory, over readings whose pressure another run of the mounting reaches; beyond, a prediction \

@@ -12,6 +12,7 @@ use super::import::{FoundZero, Import, Value, Zero};
 use super::plausibility::check;
 use super::quantity::Quantity;
 use super::stroke_zero::{at_largest, first_level, smallest};
+use crate::date::time_stamp;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -218,6 +219,14 @@ fn look_up(
                     .file(&described.file)
                     .value(cell(line))
             }),
+            (Want::Stamp { scale, offset }, _) => {
+                time_stamp(&cell(line)).map(|v| v * scale + offset).ok_or_else(|| {
+                    Error::new(DataCode::RecordingNotANumber, "not a time stamp in the lookup table")
+                        .file(&described.file)
+                        .column(name)
+                        .value(cell(line))
+                })
+            }
             (Want::Text, _) => Ok(0.0),
         };
         match &column.role {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::decimal;
 use super::line::{Cells, is_blank, trim_end};
+use crate::date::time_stamp;
 
 /// How a text file is cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +24,8 @@ pub(super) struct Dialect {
 pub(super) enum Want {
     /// A number: SI value = number · scale + offset.
     Number { scale: f64, offset: f64 },
+    /// A date with a time of day, or a time of day alone: s = its seconds · scale + offset.
+    Stamp { scale: f64, offset: f64 },
     /// The text itself, from a small vocabulary.
     Text,
 }
@@ -39,8 +42,13 @@ pub(super) struct Wanted {
 pub(super) enum Fault {
     Empty,
     NotANumber,
+    /// Neither a date with a time of day nor a time of day.
+    NotAStamp,
     NotFinite,
-    Width { found: usize, expected: usize },
+    Width {
+        found: usize,
+        expected: usize,
+    },
     OpenQuote,
 }
 
@@ -137,7 +145,7 @@ impl Fault {
     fn is_missing(&self, value: &str) -> bool {
         match self {
             Self::Empty | Self::NotFinite => true,
-            Self::NotANumber => only_signs(value),
+            Self::NotANumber | Self::NotAStamp => only_signs(value),
             Self::Width { .. } | Self::OpenQuote => false,
         }
     }
@@ -318,6 +326,13 @@ fn row(
                     Some(value) => out.numbers[next].push(value * scale + offset),
                     None => return Err(explain(start, width, index)),
                 },
+                Want::Stamp { scale, offset } => {
+                    let cell = cells.text().map_err(|()| open_quote(line))?;
+                    match time_stamp(&cell) {
+                        Some(seconds) => out.numbers[next].push(seconds * scale + offset),
+                        None => return Err(explain_stamp(start, width, index)),
+                    }
+                }
                 Want::Text => {
                     let cell = cells.text().map_err(|()| open_quote(line))?;
                     out.texts[next].push(&cell);
@@ -372,6 +387,13 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
         _ => Fault::NotANumber,
     };
     (Some(index), text.into_owned(), fault)
+}
+
+/// Why a cell is no time stamp.
+fn explain_stamp(cells: Cells<'_>, width: usize, index: usize) -> CellError {
+    let (cell, value, fault) = explain(cells, width, index);
+    let fault = if fault == Fault::NotANumber { Fault::NotAStamp } else { fault };
+    (cell, value, fault)
 }
 
 fn lossy(line: &[u8]) -> String {

@@ -3,6 +3,7 @@
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
 use super::import::Missing;
+use crate::date::time_stamp;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -101,6 +102,29 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
                 }
                 let values = values.iter().enumerate().filter(|(row, _)| kept(row));
                 numbers = values.map(|(_, v)| v * scale + offset).collect();
+            }
+            (Want::Stamp { scale, offset }, Column::Texts(texts)) => {
+                let texts = texts.iter().enumerate().filter(|(row, _)| kept(row));
+                let stamp = |(row, text): (usize, &String)| {
+                    let seconds = time_stamp(text).ok_or_else(|| {
+                        Error::new(DataCode::RecordingNotANumber, "not a time stamp")
+                            .line(row as u64 + 1)
+                            .column(name)
+                            .value(text)
+                            .help("time stamps are like 2026-11-21T13:30:00.25, or 13:30:00.25")
+                    })?;
+                    Ok(seconds * scale + offset)
+                };
+                numbers = texts.map(stamp).collect::<Result<_>>()?;
+            }
+            (Want::Stamp { .. }, Column::Numbers(values)) => {
+                return Err(Error::new(
+                    DataCode::RecordingNotANumber,
+                    "a column of numbers where time stamps are needed",
+                )
+                .column(name)
+                .value(values.first().map_or(String::new(), f64::to_string))
+                .help("give the unit of the numbers in the import description: s or ms"));
             }
             (Want::Number { .. }, Column::Texts(texts)) => {
                 return Err(Error::new(

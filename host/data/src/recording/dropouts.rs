@@ -75,7 +75,8 @@ impl<'a> Screened<'a> {
         let odd: Vec<bool> =
             (0..campaign.recordings.len()).map(|i| inconsistent.iter().any(|a| a.recording == i)).collect();
         let faults = sensor_faults(&campaign, &odd);
-        for fault in &faults {
+        // A copy of the campaign is as large as the campaign.
+        for fault in faults.iter().filter(|f| f.has_bridge()) {
             fault.bridge(&mut campaign.to_mut().recordings[fault.recording]);
         }
         Self { campaign, inconsistent, dropouts, faults }

@@ -15,7 +15,7 @@
 //!
 //! [columns.displacement]            # time, pressure, displacement, length, contraction, force, temperature,
 //! column = 2                        # pressure_command, cycle, direction, rest_length
-//! unit = "in"
+//! unit = "in"                       # of a time also "timestamp": 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25
 //! scale = 1.0                       # value in `unit` = cell · scale + offset
 //! offset = 0.0
 //! positive = "extension"            # or "contraction"
@@ -112,7 +112,8 @@ pub enum FoundZero {
 pub struct Column {
     /// The column of the file or of the lookup table.
     pub column: ColumnRef,
-    /// The unit after scale and offset; by default that of the column's name, or SI.
+    /// The unit after scale and offset; by default that of the column's name, or SI. `timestamp` for a time that is written as a date
+    /// with a time of day.
     pub unit: Option<String>,
     /// Value in `unit` = cell · scale + offset.
     #[serde(default = "one")]
@@ -126,6 +127,16 @@ pub struct Column {
     pub zero: Option<Zero>,
     /// Text to number, for columns of words.
     pub values: Option<BTreeMap<String, f64>>,
+}
+
+/// The unit of a time that is written as a date with a time of day, or as a time of day alone.
+pub(super) const TIME_STAMP: &str = "timestamp";
+
+impl Column {
+    /// Whether its cells are time stamps.
+    pub(super) fn is_stamp(&self, quantity: Quantity) -> bool {
+        quantity == Quantity::Time && self.unit.as_deref() == Some(TIME_STAMP)
+    }
 }
 
 fn one() -> f64 {
@@ -311,6 +322,7 @@ impl Import {
             }
             if let Some(unit) = &column.unit
                 && quantity.unit(unit).is_none()
+                && !column.is_stamp(quantity)
             {
                 return Err(invalid(format!("{name} has no unit `{unit}`"))
                     .column(name)

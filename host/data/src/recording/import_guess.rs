@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod absolute;
 mod layout;
 mod lookup;
 mod names;
@@ -24,6 +25,7 @@ mod roles;
 mod runs;
 mod sample;
 mod text;
+mod time;
 mod values;
 
 use std::path::Path;

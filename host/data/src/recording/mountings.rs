@@ -7,15 +7,29 @@ pub const SAME_LENGTH: f64 = 0.5e-3;
 /// An unknown pause between two recordings of one mounting counts as this long, s: someone saves a file and starts the next. The
 /// memories of a muscle span decades of time, of which the recordings themselves are most.
 const ASSUMED_REST: f64 = 5.0;
+/// An unknown pause in which the muscle is mounted anew counts as this long, s. Between 300 and 1000 s the unseen error of eleven real
+/// muscles changes by about a tenth at most (`trials festo-tables`); an endless pause is worse on most of them.
+const ASSUMED_REMOUNTING: f64 = 600.0;
 /// The time in which a muscle is vented after the last reading, s.
 pub const VENTING: f64 = 2.0;
+
+/// What a recording at a held length follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preceding {
+    /// It is the first.
+    Nothing,
+    /// A recording of another mounting.
+    OtherMounting,
+    /// A recording of the same mounting.
+    SameMounting,
+}
 
 /// The rest of a muscle before a recording at a held length, vented.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
-    /// Whether a mounting begins: memories of the load begin anew.
-    pub remounted: bool,
-    /// How long the muscle rested, s.
+    /// What it follows.
+    pub after: Preceding,
+    /// How long the muscle rested, s; infinite before the first recording.
     pub seconds: f64,
     /// Whether the bench's clock says so; otherwise it is assumed.
     pub known: bool,
@@ -70,15 +84,24 @@ impl Campaign {
         let mountings = self.mountings()?;
         let rest = |index: usize| {
             let recording = &self.recordings[index];
-            let remounted = index == 0 || mountings[index] != mountings[index - 1];
+            let after = match index.checked_sub(1) {
+                None => Preceding::Nothing,
+                Some(before) if mountings[before] != mountings[index] => Preceding::OtherMounting,
+                Some(_) => Preceding::SameMounting,
+            };
             let first = recording.time.first().copied().unwrap_or(0.0);
             let interval = recording.duration() / recording.len().saturating_sub(1).max(1) as f64;
             let known = self.pause_before(index);
             // A clock that starts near zero was started with the recording.
             let own = self.clock == Clock::Separate && (0.0..=2.0 * interval).contains(&first);
             let lead = if own { first } else { known.map_or(interval, |pause| interval.min(pause)) };
-            let seconds = known.map_or(ASSUMED_REST, |pause| (pause - lead).max(0.0));
-            Rest { remounted, seconds, known: known.is_some(), lead }
+            let assumed = match after {
+                Preceding::Nothing => f64::INFINITY,
+                Preceding::OtherMounting => ASSUMED_REMOUNTING,
+                Preceding::SameMounting => ASSUMED_REST,
+            };
+            let seconds = known.map_or(assumed, |pause| (pause - lead).max(0.0));
+            Rest { after, seconds, known: known.is_some(), lead }
         };
         Some((0..self.recordings.len()).map(rest).collect())
     }
@@ -123,11 +146,16 @@ mod tests {
         let shared =
             Campaign::new(vec![run("a", 0.0, [0.0, 1.0, 2.0], &[]), run("b", 0.0, [12.0, 13.0, 14.0], &[])]);
         let rests = shared.rests().expect("held");
-        assert!(rests[0].remounted && !rests[1].remounted);
+        assert_eq!((rests[0].after, rests[1].after), (Preceding::Nothing, Preceding::SameMounting));
+        assert!(rests[0].seconds.is_infinite() && !rests[0].known);
         assert_eq!((rests[1].known, rests[1].lead, rests[1].seconds), (true, 1.0, 9.0));
         let separate =
             Campaign::new(vec![run("a", 0.0, [0.4, 0.9, 1.4], &[]), run("b", 0.0, [0.4, 0.9, 1.4], &[])]);
         let rests = separate.rests().expect("held");
         assert_eq!((rests[1].known, rests[1].lead, rests[1].seconds), (false, 0.4, ASSUMED_REST));
+        let remounted =
+            Campaign::new(vec![run("a", 0.0, [0.4, 0.9, 1.4], &[]), run("b", 9e-3, [0.4, 0.9, 1.4], &[])]);
+        let rests = remounted.rests().expect("held");
+        assert_eq!((rests[1].after, rests[1].seconds), (Preceding::OtherMounting, ASSUMED_REMOUNTING));
     }
 }

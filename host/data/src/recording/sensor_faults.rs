@@ -204,12 +204,13 @@ pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<Sensor
 }
 
 impl SensorFault {
-    /// Replaces the failed readings by the line between those beside, good enough to follow the motion. Force stays as it was read: no
-    /// motion is derived from it.
+    /// Whether its readings are replaced. Force stays as it was read: no motion is derived from it.
+    pub(super) fn has_bridge(&self) -> bool {
+        self.channel != Channel::Force && self.kind != Kind::Dead
+    }
+
+    /// Replaces the failed readings by the line between those beside, good enough to follow the motion.
     pub(super) fn bridge(&self, recording: &mut Recording) {
-        if self.channel == Channel::Force || self.kind == Kind::Dead {
-            return;
-        }
         let column = self.channel.of_mut(recording);
         let Range { start, end } = self.rows;
         let before = start.checked_sub(1).and_then(|i| column.get(i)).copied();

@@ -127,10 +127,17 @@ pam_data::criteria! {
     STAIRCASE_TURN: f64 = 0.04, "staircase_turn", "1", Judgement;
     /// Widths of the contact that are tried in a table.
     TABLE_WIDTHS: ([f64; 3]) = [6e4, 9e4, 1.2e5], "P_c", "Pa", Derived("from the width of the knee at full length to the pressure at which a bladder carries no stress");
+    /// Times for which the muscle may have been loaded before a mounting that follows another, half a decade apart: one branch of the memory
+    /// tells no finer.
+    TABLE_LOADED: ([f64; 4]) = [3e1, 1e2, 3e2, 1e3], "T_0", "s", Judgement;
+    /// Such a load was not recorded: it is assumed only if it removes this share of the squared error of left-out runs.
+    TABLE_LOADED_GAIN: f64 = 0.25, "g_0", "1", Judgement;
     /// Least deadband of a table beside the contact: pretension of a mounted muscle pulls before any pressure.
     TABLE_LEAST_DEADBAND: f64 = -8e4, "P0_min", "Pa", Derived("a table refuses less than −100 kPa");
-    /// Rounds of a table's fit: the amplitudes beside the table, then the table beside the amplitudes.
-    TABLE_ROUNDS: usize = 4, "n_round", "1", Derived("friction and the wall's drive come from the last round; the fourth changes the residuals by less than their rounding");
+    /// Most rounds of a table's fit: friction and the wall's drive come from the last round.
+    TABLE_ROUNDS: usize = 40, "n_round", "1", Cost;
+    /// The rounds end when the layers of the table differ from those it was fitted with by less than this share of the largest force.
+    TABLE_SETTLED: f64 = 2e-4, "δ_round", "1", Derived("what is left is then below the noise of the readings");
     /// Least number of slack points whose median is the zero of the load cell.
     TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
     /// Nodes of a table of held lengths over the pressures that pull.

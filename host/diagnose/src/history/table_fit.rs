@@ -4,6 +4,7 @@
 //! The zero of the load cell is subtracted first, and the table contains it as `force-offset`.
 
 use model_core::effects::EffectName;
+use model_core::table::MuscleTable;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::pluralise::pluralise;
@@ -12,10 +13,14 @@ use pam_fit::bench::BenchName;
 use pam_fit::effect_columns::effect_columns;
 use pam_fit::numerics::median;
 use pam_fit::table_file::{About, Correction, TableFile};
+use pam_fit::vented_rest::EarlierLoad;
 use pam_fit::{Options as FitOptions, table_alone};
 
 use super::campaign::{self, Points};
-use super::criteria::{PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_ROUNDS, TABLE_WIDTHS};
+use super::criteria::{
+    PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_LOADED, TABLE_LOADED_GAIN, TABLE_ROUNDS,
+    TABLE_SETTLED, TABLE_WIDTHS,
+};
 use super::held_table::{Open, Problem, Solution, predicts_better};
 use super::law::thresholds_of;
 use super::staircase;
@@ -61,19 +66,39 @@ pub fn settled(campaign: &Campaign) -> Campaign {
     }
 }
 
-/// A solution, and the last round that gave it.
-struct Found {
-    solution: Solution,
+/// What is fitted, and what is assumed while it is.
+#[derive(Clone, Copy)]
+struct Assumed {
     open: Open,
     /// `P_c`, Pa.
     width: f64,
+    earlier_load: Option<EarlierLoad>,
+}
+
+/// A solution, and the last round that gave it.
+struct Found {
+    solution: Solution,
+    assumed: Assumed,
     columns: Vec<Vec<f64>>,
     before: Option<Solution>,
 }
 
 impl Found {
+    /// What the layers of the solution's own table give beyond those it was fitted with: root mean square over the points, N.
+    fn misses(&self, own: &[Vec<f64>]) -> f64 {
+        let layers = self.solution.amplitudes.iter().zip(own.iter().zip(&self.columns));
+        let mut differences = vec![0.0; own.first().map_or(0, Vec::len)];
+        for (amplitude, (own, fitted)) in layers {
+            differences
+                .iter_mut()
+                .zip(own.iter().zip(fitted))
+                .for_each(|(d, (o, f))| *d += amplitude * (o - f));
+        }
+        (differences.iter().map(|d| d * d).sum::<f64>() / differences.len().max(1) as f64).sqrt()
+    }
+
     fn left_out(&self, problem: &Problem<'_>) -> Vec<f64> {
-        problem.left_out(&self.columns, self.open, self.before.as_ref(), &self.solution)
+        problem.left_out(&self.columns, self.assumed.open, self.before.as_ref(), &self.solution)
     }
 }
 
@@ -138,7 +163,6 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// Recordings that cannot be fitted.
     pub(super) fn table(&self, layers: Layers) -> Result<TableFile> {
-        let bare = TableFile { table: self.base.table.clone(), about: About::default() };
         let least = PULLS * self.points.largest_force();
         let force: Vec<f64> = self.points.force.iter().map(|f| f - self.zero).collect();
         let problem = Problem::new(&self.points, &force, &self.use_point, least, &self.base.table);
@@ -150,29 +174,53 @@ impl<'a> Prepared<'a> {
             widths.filter(|(width, contact)| memory || *contact || *width == TABLE_WIDTHS[0])
         {
             let open = [memory, memory, contact, false, false];
-            let possible = |s: &Solution| f64::from(s.table.deadband.pascals()) > TABLE_LEAST_DEADBAND;
             let better = |s: &Solution| best.as_ref().is_none_or(|b| s.squares < b.solution.squares);
-            let found = self.rounds(&problem, &bare, open, width)?;
+            let found = self.rounds(&problem, Assumed { open, width, earlier_load: None })?;
             if let Some(found) = found.filter(|f| possible(&f.solution) && better(&f.solution)) {
                 best = Some(found);
             }
         }
         let Some(mut best) = best else { return Ok(self.base()) };
-        let [wall, growing, contact, ..] = best.open;
-        if let Some(found) = self.rounds(&problem, &bare, [wall, growing, contact, true, true], best.width)?
+        let [wall, growing, contact, ..] = best.assumed.open;
+        let open = [wall, growing, contact, true, true];
+        if let Some(found) = self.rounds(&problem, Assumed { open, ..best.assumed })?
             && predicts_better(&found.left_out(&problem), &best.left_out(&problem))
         {
             best = found;
         }
-        let Found { solution, width, .. } = best;
+        // Last, as nobody observed it: what the recordings show comes first.
+        if memory {
+            best = self.with_earlier_load(&problem, best)?;
+        }
+        let Found { solution, assumed, .. } = best;
         let about = if self.used.iter().all(|used| *used) {
-            self.about(&problem, &bare, &solution, width)?
+            self.about(&problem, &solution, assumed)?
         } else {
-            About::default()
+            About { earlier_load: assumed.earlier_load, ..About::default() }
         };
-        let mut table = solution.with_layers(width);
+        let mut table = solution.with_layers(assumed.width);
         table.goes_slack = self.base.table.goes_slack;
         Ok(self.zeroed(TableFile { table, about }))
+    }
+
+    /// The solution with the earlier load that predicts left-out runs best, if it predicts them clearly better than none.
+    fn with_earlier_load(&self, problem: &Problem<'_>, without: Found) -> Result<Found> {
+        let pressure = 1e3 * self.points.highest();
+        let error = |found: &Found| found.left_out(problem).iter().sum::<f64>();
+        let mut least = (1.0 - TABLE_LOADED_GAIN) * error(&without);
+        let unloaded = without.assumed;
+        let mut best = without;
+        for seconds in TABLE_LOADED {
+            let assumed = Assumed { earlier_load: Some(EarlierLoad { pressure, seconds }), ..unloaded };
+            if let Some(found) = self.rounds(problem, assumed)?.filter(|f| possible(&f.solution)) {
+                let error = error(&found);
+                if error < least {
+                    least = error;
+                    best = found;
+                }
+            }
+        }
+        Ok(best)
     }
 
     /// The columns of the layers beside a table.
@@ -186,48 +234,55 @@ impl<'a> Prepared<'a> {
         Ok(columns)
     }
 
+    /// A table without the history of its fit, but for the earlier load.
+    fn bare(&self, table: MuscleTable, assumed: Assumed) -> TableFile {
+        TableFile { table, about: About { earlier_load: assumed.earlier_load, ..About::default() } }
+    }
+
     /// Friction and the wall's drive come from the last solution.
-    fn rounds(
-        &self,
-        problem: &Problem<'_>,
-        bare: &TableFile,
-        open: Open,
-        width: f64,
-    ) -> Result<Option<Found>> {
-        let mut file = bare.clone();
+    fn rounds(&self, problem: &Problem<'_>, assumed: Assumed) -> Result<Option<Found>> {
+        let mut file = self.bare(self.base.table.clone(), assumed);
         let mut found: Option<Found> = None;
+        let settled = TABLE_SETTLED * self.points.largest_force();
         for _ in 0..TABLE_ROUNDS {
-            let columns = self.columns(&file, width)?;
+            let columns = self.columns(&file, assumed.width)?;
+            if found.as_ref().is_some_and(|found| found.misses(&columns) < settled) {
+                break;
+            }
             let before = found.map(|f| f.solution);
-            let Some(solution) = problem.solve(&columns, open, before.as_ref()) else { return Ok(None) };
+            let Some(solution) = problem.solve(&columns, assumed.open, before.as_ref()) else {
+                return Ok(None);
+            };
             file.table = solution.table.clone();
             file.table.goes_slack = self.base.table.goes_slack;
-            found = Some(Found { solution, open, width, columns, before });
+            found = Some(Found { solution, assumed, columns, before });
         }
         Ok(found)
     }
 
     /// What the file tells.
-    fn about(
-        &self,
-        problem: &Problem<'_>,
-        bare: &TableFile,
-        solution: &Solution,
-        width: f64,
-    ) -> Result<About> {
-        let with = TableFile { table: solution.table.clone(), ..bare.clone() };
-        let columns = self.columns(&with, width)?;
+    fn about(&self, problem: &Problem<'_>, solution: &Solution, assumed: Assumed) -> Result<About> {
+        let columns = self.columns(&self.bare(solution.table.clone(), assumed), assumed.width)?;
         let mountings = pluralise(self.points.mountings.len(), "mounting");
         let together = format!(
             "recorded at held lengths ({mountings}): static part, friction and the bladder's memory were fitted together, with the braid \
              angle, diameter and wall that these lengths ask for"
         );
-        let warnings = self.loaded.warnings.iter().cloned().chain([together]).collect();
+        let earlier = assumed.earlier_load.map(|load| {
+            format!(
+                "the first runs after a change of the mounting are predicted better if the muscle was filled to {:.0} kPa for about {:.0} s \
+                 before: the table stores this for predictions of these recordings",
+                1e-3 * load.pressure,
+                load.seconds
+            )
+        });
+        let warnings = self.loaded.warnings.iter().cloned().chain([together]).chain(earlier).collect();
         Ok(About {
             muscle: self.muscle.name.clone(),
             tool: format!("host {}", env!("CARGO_PKG_VERSION")),
             fit: problem.quality(solution, warnings),
             uncertainty: problem.uncertainty(&columns, solution),
+            earlier_load: assumed.earlier_load,
             ..About::default()
         })
     }
@@ -250,6 +305,11 @@ fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
     };
     let (table, mountings) = with(false).or_else(|_| with(true))?;
     Ok(TableFile { table, about: About { mountings, ..About::default() } })
+}
+
+/// Whether a table may have its deadband.
+fn possible(solution: &Solution) -> bool {
+    f64::from(solution.table.deadband.pascals()) > TABLE_LEAST_DEADBAND
 }
 
 fn chosen(campaign: &Campaign, used: &[bool]) -> Campaign {

@@ -52,7 +52,7 @@ pub(super) fn predict_left_out(
             };
             let data = solution.problem.design.normal(&parameters, &weights);
             let penalty = solution.problem.design.penalty(&data, smoothing.elastic, smoothing.friction);
-            solution.problem.design.solve(&mut parameters, &weights, &penalty, 6);
+            solution.problem.design.solve_from(data, &mut parameters, &weights, &penalty, 6);
             let residuals = solution.problem.design.residuals(&parameters);
             let chunks = chunks(solution, &residuals, |group| group as usize == g);
             progress.step();

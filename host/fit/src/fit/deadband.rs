@@ -48,12 +48,11 @@ pub(super) fn find(
 
 /// The problem with `P0` held at a value, and the parameters for it: the prior is stiffer than all points together.
 pub(super) fn hold(
-    problem: &Problem,
+    mut problem: Problem,
     weights: &[f64],
-    parameters: &[f64],
+    mut parameters: Vec<f64>,
     value: f64,
 ) -> (Problem, Vec<f64>) {
-    let (mut problem, mut parameters) = (problem.clone(), parameters.to_vec());
     parameters[Layout::DEADBAND] = 0.0;
     problem.design.origin = value;
     let of_points = problem.design.normal(&parameters, weights).matrix.at(Layout::DEADBAND, Layout::DEADBAND);

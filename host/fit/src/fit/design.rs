@@ -158,6 +158,14 @@ pub struct Curves {
     values: Vec<f64>,
 }
 
+impl Curves {
+    /// `ẽ_1 … ẽ_M, k_F` at a bin, where `D` is `M + 2`.
+    #[inline]
+    pub(super) fn at<const D: usize>(&self, bin: u32) -> &[f64] {
+        &self.values[bin as usize * (D - 1)..][..D - 1]
+    }
+}
+
 impl Design {
     /// The problem of these points, without extra columns, priors and constraints.
     #[must_use]

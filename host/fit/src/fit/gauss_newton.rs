@@ -19,8 +19,20 @@ impl Design {
         penalty: &Symmetric,
         most: usize,
     ) -> NormalEquations {
+        let normal = self.normal(parameters, weights);
+        self.solve_from(normal, parameters, weights, penalty, most)
+    }
+
+    /// As [`Design::solve`], where the normal equations at the start are known.
+    pub(super) fn solve_from(
+        &self,
+        mut normal: NormalEquations,
+        parameters: &mut Vec<f64>,
+        weights: &[f64],
+        penalty: &Symmetric,
+        most: usize,
+    ) -> NormalEquations {
         let objective = |normal: &NormalEquations, at: &[f64]| normal.misfit + penalty.quadratic(at);
-        let mut normal = self.normal(parameters, weights);
         let mut best = objective(&normal, parameters);
         for _ in 0..most {
             let mut matrix = normal.matrix.clone();
@@ -61,6 +73,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::fit::design::Measured;
     use model_core::braid::miniature;
+    use model_core::table::MAX_ORDER;
 
     /// Loops of a known table at six pressures: a parametrised truth for the solver.
     pub(crate) fn known(order: usize) -> (Design, Vec<f64>) {
@@ -139,27 +152,41 @@ pub(crate) mod tests {
 
     #[test]
     fn sums_by_bin_are_the_sums_of_rows() {
-        let (design, mut at) = known(2);
-        at[3] += 0.7;
-        at[0] += 3e3;
-        let weights: Vec<f64> = (0..design.rows.len()).map(|i| 1.0 + (i % 3) as f64).collect();
-        let normal = design.normal(&at, &weights);
-        let curves = design.curves(&at);
-        let n = design.layout().len();
-        let mut direct = NormalEquations::zeros(n);
+        for order in 1..=MAX_ORDER {
+            for extras in [0, 1] {
+                let (mut design, mut at) = known(order);
+                at[3] += 0.7;
+                at[0] += 3e3;
+                design.extras = extras;
+                design.extra = (0..extras * design.rows.len()).map(|i| (i as f64 * 0.37).sin()).collect();
+                design.extra_prior = vec![0.0; extras];
+                at.extend(vec![0.5; extras]);
+                assert_sums(&design, &at);
+            }
+        }
+    }
+
+    fn assert_sums(design: &Design, at: &[f64]) {
+        let weights: Vec<f64> = (0..design.rows.len()).map(|i| (i % 4) as f64).collect();
+        let normal = design.normal(at, &weights);
+        let curves = design.curves(at);
+        let mut direct = NormalEquations::zeros(design.layout().len());
         for (i, w) in weights.iter().enumerate() {
-            let j: Vec<(usize, f64)> = design.gradient(i, &at, &curves).into_iter().enumerate().collect();
-            let r = design.rows[i].force - design.evaluate(i, &at, &curves).force;
+            let j: Vec<(usize, f64)> = design.gradient(i, at, &curves).into_iter().enumerate().collect();
+            let r = design.rows[i].force - design.evaluate(i, at, &curves).force;
             direct.matrix.add_row(&j, *w);
             for (k, v) in &j {
                 direct.right[*k] += w * v * r;
             }
+            direct.misfit += w * r * r;
+            direct.weight += w;
         }
-        for (a, b) in normal.matrix.a.iter().zip(&direct.matrix.a) {
-            assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}");
-        }
-        for (a, b) in normal.right.iter().zip(&direct.right) {
-            assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}");
+        let told = format!("{:?}", design.layout());
+        let (pairs, rights) =
+            (normal.matrix.a.iter().zip(&direct.matrix.a), normal.right.iter().zip(&direct.right));
+        let single = [(&normal.misfit, &direct.misfit), (&normal.weight, &direct.weight)];
+        for (a, b) in pairs.chain(rights).chain(single) {
+            assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}, {told}");
         }
     }
 }

@@ -14,6 +14,7 @@
 use pam_data::pluralise::pluralise;
 
 use super::Options;
+use super::points::Points;
 use super::screen::PointUse;
 use super::solution::Solution;
 
@@ -21,9 +22,9 @@ use super::solution::Solution;
 const FEWEST_LENGTHS: usize = 3;
 
 /// The options that open dimensions and lengths, where the recordings were held and no option was given.
-pub(super) fn open(solution: &Solution, options: &Options) -> Option<Options> {
+pub(super) fn open(points: &Points, options: &Options) -> Option<Options> {
     let asked = options.fit_geometry || options.fit_lengths || options.as_described;
-    let held = solution.problem.points.held_lengths();
+    let held = points.held_lengths();
     (!asked && held.len() >= FEWEST_LENGTHS).then(|| Options {
         fit_geometry: true,
         fit_lengths: true,

@@ -46,6 +46,22 @@ struct Sums {
     weight: f64,
 }
 
+/// Small sums of one bin, of a number of columns that the compiler knows.
+struct Fixed<const D: usize> {
+    square: [[f64; D]; D],
+    right: [f64; D],
+    misfit: f64,
+    weight: f64,
+}
+
+/// Where sums are taken.
+struct At<'a> {
+    rows: Range<usize>,
+    parameters: &'a [f64],
+    curves: &'a Curves,
+    weights: &'a [f64],
+}
+
 impl Design {
     /// Sums by bin over a stretch of rows; bins without weight there are absent.
     fn sums(
@@ -55,25 +71,92 @@ impl Design {
         curves: &Curves,
         weights: &[f64],
     ) -> Vec<(u32, Sums)> {
+        let at = At { rows, parameters, curves, weights };
+        // A number of columns that the compiler knows takes half the time; extra columns come with few points.
+        match (self.orthonormal.order + 2, self.extras) {
+            (3, 0) => self.sums_of::<3>(at),
+            (4, 0) => self.sums_of::<4>(at),
+            (5, 0) => self.sums_of::<5>(at),
+            (6, 0) => self.sums_of::<6>(at),
+            (7, 0) => self.sums_of::<7>(at),
+            (8, 0) => self.sums_of::<8>(at),
+            _ => self.sums_with_extras(at),
+        }
+    }
+
+    /// [`Design::sums`] of `D` columns, which are `M + 2`.
+    fn sums_of<const D: usize>(&self, at: At<'_>) -> Vec<(u32, Sums)> {
+        let mut place = vec![u32::MAX; self.bins.len()];
+        let mut sums: Vec<(u32, Fixed<D>)> = Vec::new();
+        let deadband = at.parameters[Layout::DEADBAND];
+        for (row, w) in self.rows[at.rows.clone()].iter().zip(&at.weights[at.rows]) {
+            let w = *w;
+            if w <= 0.0 {
+                continue;
+            }
+            let curves = at.curves.at::<D>(row.bin);
+            let mut quasi = (row.pressure - self.origin - deadband) * row.area;
+            for (e, c) in curves[..D - 2].iter().zip(&row.elastic) {
+                quasi += e * c;
+            }
+            let grip = 1.0 - row.direction * curves[D - 2];
+            let r = row.force - grip * quasi;
+            let mut y = [0.0; D];
+            for (y, c) in y[..D - 2].iter_mut().zip(&row.elastic) {
+                *y = grip * c;
+            }
+            y[D - 2] = -row.direction * quasi;
+            y[D - 1] = -grip * row.area;
+            let place = &mut place[row.bin as usize];
+            if *place == u32::MAX {
+                *place = sums.len() as u32;
+                sums.push((
+                    row.bin,
+                    Fixed { square: [[0.0; D]; D], right: [0.0; D], misfit: 0.0, weight: 0.0 },
+                ));
+            }
+            let s = &mut sums[*place as usize].1;
+            // The upper half is not used; whole rows are quicker than halves.
+            for ((square, right), ya) in s.square.iter_mut().zip(&mut s.right).zip(&y) {
+                let wy = w * ya;
+                *right += wy * r;
+                for (to, yb) in square.iter_mut().zip(&y) {
+                    *to += wy * yb;
+                }
+            }
+            s.misfit += w * r * r;
+            s.weight += w;
+        }
+        let general = |s: Fixed<D>| Sums {
+            square: s.square.concat(),
+            right: s.right.to_vec(),
+            misfit: s.misfit,
+            weight: s.weight,
+        };
+        sums.into_iter().map(|(bin, s)| (bin, general(s))).collect()
+    }
+
+    /// [`Design::sums`] of any number of columns.
+    fn sums_with_extras(&self, at: At<'_>) -> Vec<(u32, Sums)> {
         let d = self.orthonormal.order + 2 + self.extras;
         let mut place = vec![u32::MAX; self.bins.len()];
         let mut sums: Vec<(u32, Sums)> = Vec::new();
         let mut y = vec![0.0; d];
-        for i in rows {
-            let (row, w) = (&self.rows[i], weights[i]);
+        for i in at.rows {
+            let (row, w) = (&self.rows[i], at.weights[i]);
             if w <= 0.0 {
                 continue;
             }
-            let e = self.evaluate(i, parameters, curves);
+            let e = self.evaluate(i, at.parameters, at.curves);
             let r = row.force - e.force;
             self.small_columns(i, &e, &mut y);
-            let at = &mut place[row.bin as usize];
-            if *at == u32::MAX {
-                *at = sums.len() as u32;
+            let place = &mut place[row.bin as usize];
+            if *place == u32::MAX {
+                *place = sums.len() as u32;
                 let empty = Sums { square: vec![0.0; d * d], right: vec![0.0; d], misfit: 0.0, weight: 0.0 };
                 sums.push((row.bin, empty));
             }
-            let s = &mut sums[*at as usize].1;
+            let s = &mut sums[*place as usize].1;
             for (a, ya) in y.iter().enumerate() {
                 let wy = w * ya;
                 s.right[a] += wy * r;

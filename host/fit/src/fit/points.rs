@@ -184,12 +184,13 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let mut steps =
         Steps { stroke: stroke_step, pressure: pressure_step, rows: most_rows, per_stroke, per_pressure };
     // Many short strokes make many points, of which no more is known of the force: then pieces are longer.
-    let (list, block) = loop {
+    let (mut list, block) = loop {
         match cut(screened, motions, &taken, &steps) {
             Some(cut) => break cut,
             None => steps = steps.longer(),
         }
     };
+    list.shrink_to_fit();
     let row_noise = row_noise(campaign, rows);
     let mountings = campaign.recordings.iter().map(HeldMounting::of).collect();
     Points { list, rows, blocks: block, pressure, stroke, force, row_noise, stroke_noise, mountings }

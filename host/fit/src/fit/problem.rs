@@ -1,5 +1,7 @@
 //! The problem that a fit solves: points, nodes, dimensions and the linear problem that they make. Solving does not change it.
 
+use std::sync::Arc;
+
 use model_core::braid::{Braid, Geometry};
 
 use super::basis::{Columns, Orthonormal, columns};
@@ -16,8 +18,8 @@ use crate::numerics::symmetric::Symmetric;
 /// A campaign as a linear problem.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// Means over short pieces of motion, in time order.
-    pub points: Points,
+    /// Means over short pieces of motion, in time order. Shared by all problems of one campaign, as there may be a million of them.
+    pub points: Arc<Points>,
     /// The tested pressures and the nodes of the curves over pressure, Pa.
     pub pressures: Pressures,
     /// The muscle at rest as the muscle description has it.
@@ -57,7 +59,7 @@ impl Problem {
         let shift = vec![0.0; points.list.len()];
         let design = design(&points, &pressures, &braid, &shift, screen, order);
         Self {
-            points,
+            points: Arc::new(points),
             pressures,
             nominal: geometry,
             geometry,
@@ -73,7 +75,19 @@ impl Problem {
     /// The same points with an elastic polynomial of another order.
     pub(super) fn of_order(&self, screen: &Screen, order: usize) -> Self {
         let design = design(&self.points, &self.pressures, &self.braid, &self.shift, screen, order);
-        Self { design, ..self.clone() }
+        // Field by field: the clone of a whole problem would copy a design to throw it away.
+        Self {
+            points: Arc::clone(&self.points),
+            pressures: self.pressures.clone(),
+            nominal: self.nominal,
+            geometry: self.geometry,
+            braid: self.braid,
+            shift: self.shift.clone(),
+            adjusted: self.adjusted.clone(),
+            mountings: self.mountings.clone(),
+            clips: self.clips,
+            design,
+        }
     }
 
     /// The tested level, or the interval of a continuous range, that a point belongs to.
@@ -118,9 +132,10 @@ impl Problem {
         smoothing: Smoothing,
         steps: usize,
     ) -> Vec<f64> {
-        let penalty = self.penalty(start, weights, smoothing);
+        let data = self.design.normal(start, weights);
+        let penalty = self.design.penalty(&data, smoothing.elastic, smoothing.friction);
         let mut parameters = start.to_vec();
-        self.design.solve(&mut parameters, weights, &penalty, steps);
+        self.design.solve_from(data, &mut parameters, weights, &penalty, steps);
         parameters
     }
 }

@@ -23,7 +23,7 @@ use super::nodes::pressures;
 use super::outliers::despike;
 use super::points::{Points, points};
 use super::problem::{Ingredients, Problem};
-use super::screen::{self, Screen};
+use super::screen::{self, Clip, Outlier, Screen};
 use super::smoothing::{self, Smoothing};
 use super::solution::Solution;
 use super::weights::{Weights, robust};
@@ -50,6 +50,43 @@ pub(super) fn solve(
         recording.require_force()?;
     }
     progress.stage("finding strokes and reversals", 0);
+    let Cut { points, clips, outliers, braid, geometry, mut warnings } = cut(campaign, muscle, options)?;
+    let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
+    let screen = Screen::without_model(&points, clips, outliers);
+    let ingredients =
+        Ingredients { pressures: pressures(&points, max_pressure), points, geometry, braid, clips };
+    let problem = Problem::new(ingredients, &screen, options.order);
+    if dimension_search::lacks_mountings(&problem, options) {
+        warnings.push(
+            "no recording was held at one length: there is no mounting whose length could be corrected"
+                .into(),
+        );
+    }
+    let Some(open) = held_lengths::open(&problem.points, options) else {
+        return Ok(Solution { warnings, ..search(problem, screen, options, progress) });
+    };
+    let described = search(problem.clone(), screen.clone(), options, progress);
+    let choice = held_lengths::choose(described, search(problem, screen, &open, progress));
+    warnings.push(choice.reason);
+    Ok(Solution { warnings, ..choice.solution })
+}
+
+/// What the search needs of a campaign.
+struct Cut {
+    points: Points,
+    clips: (Option<Clip>, Option<Clip>),
+    outliers: Vec<Outlier>,
+    geometry: Geometry,
+    braid: Braid<f64>,
+    warnings: Vec<String>,
+}
+
+/// Cuts a campaign into points. The copy in which failed readings are bridged, as large as the campaign, ends here: the search needs as
+/// much memory again.
+///
+/// # Errors
+/// Recordings that cannot be those of this muscle.
+fn cut(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<Cut> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
     let mut points = points(&screened, &Motion::of_campaign(campaign));
@@ -57,28 +94,9 @@ pub(super) fn solve(
     let geometry = Geometry { tip_correction: options.tip_correction, ..muscle.geometry() };
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
     check_contractions(&points, campaign, &braid)?;
-    let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
-    let clips = screen::clip(campaign);
     let outliers = despike(campaign, &mut points);
-    let screen = Screen::without_model(&points, clips, outliers);
-    let ingredients =
-        Ingredients { pressures: pressures(&points, max_pressure), points, geometry, braid, clips };
-    let problem = Problem::new(ingredients, &screen, options.order);
-    let mut warnings: Vec<String> = campaign.warnings.iter().cloned().chain(screened.remark()).collect();
-    if dimension_search::lacks_mountings(&problem, options) {
-        warnings.push(
-            "no recording was held at one length: there is no mounting whose length could be corrected"
-                .into(),
-        );
-    }
-    let solution = search(problem.clone(), screen.clone(), options, progress);
-    let open = held_lengths::open(&solution, options);
-    let Some(open) = open.map(|options| search(problem, screen, &options, progress)) else {
-        return Ok(Solution { warnings, ..solution });
-    };
-    let choice = held_lengths::choose(solution, open);
-    warnings.push(choice.reason);
-    Ok(Solution { warnings, ..choice.solution })
+    let warnings = campaign.warnings.iter().cloned().chain(screened.remark()).collect();
+    Ok(Cut { points, clips: screen::clip(campaign), outliers, geometry, braid, warnings })
 }
 
 /// # Errors
@@ -146,7 +164,7 @@ fn search(problem: Problem, screen: Screen, options: &Options, progress: &dyn Pr
         Stage::weighed(problem, screen, &parameters, 4);
     let held = deadband::find(&problem, &screen, &weights.values, &parameters, options);
     if let Some(held) = held {
-        (problem, parameters) = deadband::hold(&problem, &weights.values, &parameters, held.value);
+        (problem, parameters) = deadband::hold(problem, &weights.values, parameters, held.value);
     }
     let smoothing = match options.smoothing {
         Some(weight) => Smoothing { elastic: weight, friction: weight },

@@ -5,6 +5,7 @@ mod vocabulary;
 
 use crate::recording::Quantity;
 
+use self::units::counts_from_vacuum;
 pub(super) use self::units::{Family, UnitSpelling, unit};
 use self::vocabulary::{AT_REST, COMMANDED, DERIVED, LENGTHENING, NEUTRAL, RUNS, STRONG, WAYS, WEAK};
 
@@ -24,10 +25,11 @@ impl Name {
     /// `Pressure [bar]`, `F (N)`, `t_s`, `Kraft / N`, `load cell`.
     pub(super) fn of(header: &str) -> Self {
         let header = header.trim().trim_matches('"').trim();
+        if let Some(name) = Self::with_mark(header).or_else(|| Self::of_ratio(header)) {
+            return name;
+        }
         for (open, close) in [('[', ']'), ('(', ')'), ('<', '>')] {
-            if let Some((base, rest)) = header.split_once(open)
-                && let Some((inside, after)) = rest.split_once(close)
-            {
+            if let Some((base, inside, after)) = bracketed(header, open, close) {
                 let found = unit(inside);
                 let unknown = found.is_none().then(|| inside.trim().to_owned()).filter(|u| !u.is_empty());
                 return Self { words: words(&format!("{base} {after}")), unit: found, unknown_unit: unknown };
@@ -42,6 +44,33 @@ impl Name {
             }
         }
         Self { words: words(header), unit: unit(header).filter(|u| u.text.len() > 1), unknown_unit: None }
+    }
+
+    /// `Pressure kPa abs`, `p_bar_a`, `Pressure bar (a)`: a unit of pressure with the mark of its zero apart from it.
+    fn with_mark(header: &str) -> Option<Self> {
+        let (base, mark) = match header.strip_suffix(')').and_then(|h| h.rsplit_once('(')) {
+            Some(parts) => parts,
+            None => header.rsplit_once([' ', '_'])?,
+        };
+        let absolute = counts_from_vacuum(mark)?;
+        let name = Self::of(base.trim_end());
+        let unit = name.unit.filter(|u| u.family == Family::Pressure)?;
+        Some(Self { unit: Some(UnitSpelling { absolute, ..unit }), ..name })
+    }
+
+    /// `L/L0`, `ΔL / L0`: a length or its change over the rest length.
+    fn of_ratio(header: &str) -> Option<Self> {
+        let bare = header.find(['[', '(']).map_or(header, |at| &header[..at]);
+        let (above, below) = bare.split_once('/')?;
+        let is_rest = ["l0", "l_0", "l₀"].contains(&below.trim().to_lowercase().as_str());
+        let word = match above.trim().to_lowercase().as_str() {
+            "l" => "length",
+            "dl" | "δl" | "∆l" | "delta l" | "delta_l" | "deltal" => "contraction",
+            _ => return None,
+        };
+        let of = header[bare.len()..].trim_matches(['[', ']', '(', ')', ' ']);
+        let ratio = unit(of).or_else(|| unit("-")).filter(|u| is_rest && u.family == Family::Ratio)?;
+        Some(Self { words: vec![word.to_owned()], unit: Some(ratio), unknown_unit: None })
     }
 
     /// A name with the unit that is below it, in a row of its own.
@@ -63,7 +92,13 @@ impl Name {
 
     /// Whether it says that a pressure counts from vacuum.
     pub(super) fn absolute(&self) -> bool {
-        self.has(&["absolute", "abs", "absolut", "absolutdruck"])
+        self.unit.is_some_and(|u| u.absolute) || self.has(&["absolute", "abs", "absolut", "absolutdruck"])
+    }
+
+    /// Whether it is a length as a share of the rest length, one of a muscle at rest.
+    pub(super) fn is_relative_length(&self) -> bool {
+        let named = STRONG.iter().chain(WEAK).find(|(q, list)| *q != Quantity::Contraction && self.has(list));
+        self.family() == Some(Family::Ratio) && named.is_some_and(|(q, _)| *q == Quantity::Length)
     }
 
     /// Whether it sets runs apart.
@@ -94,16 +129,21 @@ impl Name {
             (None, None, None) => return None,
         };
         let commanded = self.has(COMMANDED);
+        let ratio = self.family() == Some(Family::Ratio);
         let quantity = match quantity {
             Quantity::Pressure if commanded => Quantity::PressureCommand,
             _ if commanded => return None,
             // A contraction in millimetres is a stroke, and a stroke in per cent a contraction.
             Quantity::Contraction if self.family() == Some(Family::Length) => Quantity::Displacement,
-            Quantity::Displacement if self.family() == Some(Family::Ratio) => Quantity::Contraction,
+            Quantity::Displacement if ratio => Quantity::Contraction,
+            // A length as a share of the rest length.
+            Quantity::Length if ratio => Quantity::Contraction,
             Quantity::Length if self.has(AT_REST) => Quantity::RestLength,
             other => other,
         };
-        if self.has(DERIVED) && !self.is_raw() || self.family().is_some_and(|f| !fits(quantity, f)) {
+        // A "contraction rate" in per cent is a contraction, as data sheets call it.
+        let derived = self.words.iter().any(|w| DERIVED.contains(&w.as_str()) && !(ratio && w == "rate"));
+        if derived && !self.is_raw() || self.family().is_some_and(|f| !fits(quantity, f)) {
             return None;
         }
         let known = |w: &&String| {
@@ -121,6 +161,18 @@ impl Name {
     fn family(&self) -> Option<Family> {
         self.unit.map(|u| u.family)
     }
+}
+
+/// What stands before a pair of brackets, in it, and behind it; the pair may contain others: `p (bar(a))`.
+fn bracketed(text: &str, open: char, close: char) -> Option<(&str, &str, &str)> {
+    let (base, rest) = text.split_once(open)?;
+    let mut depth = 1_usize;
+    let end = rest.char_indices().find_map(|(at, c)| {
+        depth = if c == open { depth + 1 } else { depth - usize::from(c == close) };
+        (depth == 0).then_some(at)
+    });
+    let end = end.or_else(|| rest.find(close))?;
+    Some((base, &rest[..end], &rest[end + close.len_utf8()..]))
 }
 
 /// The quantity of a unit that stands alone; a length could be several.

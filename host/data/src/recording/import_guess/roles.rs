@@ -5,7 +5,7 @@ use std::path::Path;
 use super::lookup;
 use super::names::{Family, Name, Score};
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, Source, runs, values};
+use super::{Guess, GuessedColumn, Source, absolute, runs, time, values};
 use crate::recording::Quantity;
 use crate::short_number::short;
 
@@ -54,10 +54,11 @@ pub(super) fn assign(path: &Path, sample: &Sample) -> Guess {
             guess.columns.push(column);
         }
     }
-    find_time(sample, &mut used, &mut guess);
+    time::find(sample, &mut used, &mut guess);
     find_pressure(sample, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
     judge_stroke(sample, &mut guess);
+    absolute::ask(sample, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
     guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
     what_is_missing(sample, &mut guess);
@@ -65,7 +66,7 @@ pub(super) fn assign(path: &Path, sample: &Sample) -> Guess {
 }
 
 /// Where a column is, for the description: by name where the reader finds that name once.
-fn source(sample: &Sample, n: usize) -> Source {
+pub(super) fn source(sample: &Sample, n: usize) -> Source {
     let header = &sample.columns[n].header;
     let once = sample.columns.iter().filter(|c| c.header == *header).count() == 1;
     if sample.has_header && once && !header.is_empty() {
@@ -150,8 +151,16 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
     let (low, high) = column.range();
     if quantity == Quantity::Pressure && column.name.absolute() {
         // Standard atmosphere; the pressure of the day differs by a few per cent of it.
-        offset -= quantity.unit(unit).map_or(0.0, |u| 101_325.0 / u.scale);
+        offset -= quantity.unit(unit).map_or(0.0, |u| absolute::ATMOSPHERE / u.scale);
         guess.checks.push(format!("{header} is absolute pressure: one standard atmosphere is subtracted"));
+    }
+    if quantity == Quantity::Contraction && column.name.is_relative_length() {
+        (scale, offset) = (-scale, 1.0);
+    } else if quantity == Quantity::Contraction && -low > high {
+        scale = -scale;
+        guess.checks.push(format!(
+            "{header} is negative where it is largest: its sign is reversed, so that shortening is positive"
+        ));
     }
     let si = |v: f64| quantity.unit(unit).map_or(v, |u| (v * scale + offset) * u.scale);
     if let Some(doubt) = values::doubt(quantity, si(low), si(high)) {
@@ -185,56 +194,6 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
         values: Vec::new(),
         range: Some((low, high)),
     })
-}
-
-/// A column that increases from row to row is the time where no name says so.
-fn find_time(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
-    if guess.has(Quantity::Time) {
-        return;
-    }
-    let dated = sample
-        .columns
-        .iter()
-        .find(|c| !c.is_numeric() && c.name.quantity().is_some_and(|(q, _)| q == Quantity::Time));
-    if let Some(column) = dated {
-        guess.unknown.push(format!(
-            "{} holds dates or times of day, which are not read: write seconds from some beginning, or give sample_interval_s",
-            column.header
-        ));
-        return;
-    }
-    let unnamed = |(n, c): &(usize, &SampleColumn)| {
-        !used[*n]
-            && c.name.quantity().is_none()
-            && c.name.unit.is_none()
-            && values::increases(c)
-            && !values::counts_rows(c)
-    };
-    if let Some((n, column)) = sample.columns.iter().enumerate().find(unnamed)
-        && let Some(suggested) = values::suggested(Quantity::Time, column)
-    {
-        used[n] = true;
-        guess.checks.push(format!(
-            "column {} is taken as the time in {}, since it increases from row to row",
-            column.header,
-            if suggested.scale == 1.0 { suggested.unit } else { "µs" }
-        ));
-        guess.columns.insert(
-            0,
-            GuessedColumn {
-                quantity: Quantity::Time,
-                source: source(sample, n),
-                header: column.header.clone(),
-                unit: suggested.unit,
-                scale: suggested.scale,
-                offset: 0.0,
-                extension: false,
-                from_longest: false,
-                values: Vec::new(),
-                range: Some(column.range()),
-            },
-        );
-    }
 }
 
 /// A pressure that the file's name or a line above the table states.

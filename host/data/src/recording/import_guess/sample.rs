@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::layout::{Layout, cells, is_missing, number};
 use super::names::Name;
+use crate::date::time_stamp;
 use crate::error::{DataCode, Error, Result};
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
@@ -26,12 +27,14 @@ pub(super) struct SampleColumn {
     /// As the file has it; a number where it has none.
     pub header: String,
     pub name: Name,
-    /// Numbers; NaN where a cell holds none.
+    /// Numbers, of time stamps their seconds; NaN where a cell holds none.
     pub numbers: Vec<f64>,
     /// Cells that are empty or not finite.
     pub missing: usize,
     /// Cells that are neither numbers nor missing.
     pub texts: usize,
+    /// How many of these are dates with a time of day, or times of day.
+    pub stamps: usize,
     /// The different cells, where there are few, and which of them each row has.
     pub levels: Option<Levels>,
 }
@@ -69,12 +72,16 @@ impl SampleColumn {
     fn push(&mut self, cell: &str, decimal_comma: bool) {
         let cell = cell.trim();
         let value = number(cell, decimal_comma);
+        let stamp = if value.is_none() { time_stamp(cell) } else { None };
         match value {
             None if is_missing(cell) => self.missing += 1,
-            None => self.texts += 1,
+            None => {
+                self.texts += 1;
+                self.stamps += usize::from(stamp.is_some());
+            }
             Some(_) => {}
         }
-        self.numbers.push(value.unwrap_or(f64::NAN));
+        self.numbers.push(value.or(stamp).unwrap_or(f64::NAN));
         if self.levels.as_mut().is_some_and(|l| !l.push(cell)) {
             self.levels = None;
         }
@@ -83,6 +90,11 @@ impl SampleColumn {
     /// Whether it holds numbers.
     pub(super) fn is_numeric(&self) -> bool {
         self.texts == 0 && self.missing < self.numbers.len()
+    }
+
+    /// Whether it holds dates with a time of day, or times of day.
+    pub(super) fn is_stamped(&self) -> bool {
+        self.texts > 0 && self.texts == self.stamps && self.texts + self.missing == self.numbers.len()
     }
 
     /// Its finite numbers.

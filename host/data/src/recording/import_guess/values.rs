@@ -85,11 +85,6 @@ pub(super) fn doubt(quantity: Quantity, low: f64, high: f64) -> Option<String> {
         Quantity::Pressure if !(10e3..=2e6).contains(&peak) => {
             Some(format!("the highest pressure would be {} kPa: is the unit right?", short(high * 1e-3)))
         }
-        Quantity::Pressure if (90e3..110e3).contains(&low) && high > 2.0 * low => Some(format!(
-            "the lowest pressure is {} kPa, about that of the atmosphere: if the sensor measures absolute pressure, \
-             subtract it by an offset",
-            short(low * 1e-3)
-        )),
         Quantity::Force if !(0.5..=20e3).contains(&peak) => {
             Some(format!("the largest force would be {} N: is the unit right?", short(peak)))
         }

@@ -51,8 +51,8 @@ pub(super) fn rows_error(error: RowsError, header: &Header, import: &Import) -> 
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
             let of_a_clock = value.contains(':') || value.matches(['-', '/']).count() == 2;
             let help = if of_a_clock && value.starts_with(|c: char| c.is_ascii_digit()) {
-                "dates and times of day are not read: write seconds or milliseconds from some beginning (in a spreadsheet \
-                 =(A2-A$2)*86400), or give sample_interval_s in an import description"
+                "dates and times of day need unit = \"timestamp\" in an import description, which `host import --guess` writes; or write \
+                 seconds from some beginning (in a spreadsheet =(A2-A$2)*86400)"
             } else if value.contains(',') && value.contains('.') {
                 "write numbers without thousands separators"
             } else if comma && !header.dialect.decimal_comma {
@@ -69,6 +69,9 @@ pub(super) fn rows_error(error: RowsError, header: &Header, import: &Import) -> 
             };
             Error::new(DataCode::RecordingNotANumber, "not a number").help(help)
         }
+        Fault::NotAStamp => Error::new(DataCode::RecordingNotANumber, "not a time stamp").help(
+            "time stamps are like 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25; a month before the day is ambiguous",
+        ),
         Fault::Width { found, expected } => {
             let cells = pluralise(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {

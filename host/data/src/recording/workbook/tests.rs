@@ -54,13 +54,25 @@ fn what_is_no_recording_is_told_with_the_remedy() {
     assert!(told("two_sheets.ods", &plain).contains("notes & more, Run 1"));
     let wrong = Reader { sheet: Some("Run 2".into()), ..Reader::new() };
     assert!(told("two_sheets.xlsx", &wrong).contains("its sheets are notes, Run 1"));
-    assert!(told("dates.xlsx", &plain).contains("dates and times of day are not read"));
+    assert!(told("dates.xlsx", &plain).contains("dates and times of day need unit = \"timestamp\""));
     // The row of a spreadsheet is the line of the message.
     let missing = told("missing_value.xlsx", &plain);
     assert!(
         missing.contains("missing_value.xlsx:5, column force_N") && missing.contains("--missing skip"),
         "{missing}"
     );
+}
+
+#[test]
+fn dates_of_a_sheet_are_read_as_time_stamps() {
+    let import = Import::parse("[columns.time]\ncolumn = 1\nunit = \"timestamp\"\n").unwrap();
+    let dated = Reader::new().import(Some(&import)).file(&fixture("dates.xlsx")).unwrap().remove(0);
+    let plain = Reader::new().file(&fixture("recording.xlsx")).unwrap().remove(0);
+    // 2024-05-01 10:00 UTC.
+    assert!((dated.time[0] - 1_714_557_600.0).abs() < 1e-3, "{}", dated.time[0]);
+    for (dated, plain) in dated.time.iter().zip(&plain.time) {
+        assert!((dated - 1_714_557_600.0 - plain).abs() < 1e-3, "{dated} {plain}");
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
+use pam_fit::vented_rest::EarlierLoad;
 
 use super::super::table_fit;
 use super::super::table_unseen::{LeftOut, unseen_by_table};
@@ -23,6 +24,11 @@ fn campaign(effects: &[f64; 4]) -> Campaign {
 
 /// The same with any effects.
 fn campaign_of(effects: &[FittedEffect]) -> Campaign {
+    campaign_after(effects, None)
+}
+
+/// The same after a load before each change of the mounting.
+fn campaign_after(effects: &[FittedEffect], earlier_load: Option<EarlierLoad>) -> Campaign {
     let mut recordings = Vec::new();
     for mounting in 0..4 {
         for run in 0..5 {
@@ -44,7 +50,8 @@ fn campaign_of(effects: &[FittedEffect]) -> Campaign {
     table.goes_slack = true;
     table.friction.iter_mut().for_each(|k| *k = 0.01);
     table.effects.extend(effects.iter().cloned());
-    let made = predict(&TableFile { table, about: About::default() }, &campaign).expect("a valid table");
+    let about = About { earlier_load, ..About::default() };
+    let made = predict(&TableFile { table, about }, &campaign).expect("a valid table");
     let mut random = Random(7);
     for (recording, made) in campaign.recordings.iter_mut().zip(&made.recordings) {
         recording.force = Some(made.force.iter().map(|f| f + 0.1 * random.normal()).collect());
@@ -60,10 +67,42 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     let effect = &file.table.effects[0];
     assert_eq!(effect.effect, EffectName::BladderCreep);
     assert!((f64::from(effect.parameters[0]) / TRUTH[0] - 1.0).abs() < 0.2, "{effect:?}");
+    assert_eq!(file.about.earlier_load, None, "nothing was loaded before");
     let [settled, recorded] =
         unseen_by_table(&campaign, &campaign, &muscle, LeftOut::Runs).expect("fitted").expect("staircases");
     assert!(settled.with_memory.rms_pct < 0.5 * settled.without_memory.rms_pct, "{settled:?}");
     assert_eq!(settled.with_memory, recorded.with_memory);
+}
+
+/// The wall's drive in the fit is that of the round before: a table that is taken too early predicts worse than its own fit.
+#[test]
+fn a_table_predicts_its_recordings_as_well_as_it_was_fitted() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let campaign = campaign(&[0.7, 10e3, 100e3, 6e4]);
+    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
+    let predicted = predict(&file, &campaign).expect("a valid table");
+    let (mut squares, mut count) = (0.0, 0.0);
+    for (recording, predicted) in campaign.recordings.iter().zip(&predicted.recordings) {
+        let read = recording.force.as_ref().expect("a force");
+        for (read, predicted) in read.iter().zip(&predicted.force).filter(|(read, _)| **read > 10.0) {
+            squares += (predicted - read).powi(2);
+            count += 1.0;
+        }
+    }
+    let (rms, fitted) = ((squares / count).sqrt(), file.about.fit.rms_newtons);
+    assert!((rms / fitted - 1.0).abs() < 0.1, "predicted with {rms} N rms, fitted with {fitted} N");
+}
+
+#[test]
+fn a_load_before_a_change_of_the_mounting_is_found_and_stored() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let loaded = EarlierLoad { pressure: 569e3, seconds: 300.0 };
+    let campaign = campaign_after(&[FittedEffect::new(EffectName::BladderCreep, &TRUTH)], Some(loaded));
+    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
+    let found = file.about.earlier_load.expect("found");
+    assert!((100.0..=1000.0).contains(&found.seconds), "{found:?}");
+    assert!((found.pressure / loaded.pressure - 1.0).abs() < 0.02, "{found:?}");
+    assert!(file.about.fit.warnings.iter().any(|w| w.contains("before")), "{:?}", file.about.fit.warnings);
 }
 
 #[test]

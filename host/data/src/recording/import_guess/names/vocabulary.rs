@@ -15,6 +15,7 @@ pub(super) const STRONG: &[(Quantity, &[&str])] = &[
             "timestamp",
             "elapsed",
             "uhrzeit",
+            "zeitstempel",
             "seconds",
             "datetime",
         ],
@@ -64,7 +65,7 @@ pub(super) const STRONG: &[(Quantity, &[&str])] = &[
 
 /// Words and symbols that name a quantity where nothing better does.
 pub(super) const WEAK: &[(Quantity, &[&str])] = &[
-    (Quantity::Time, &["t", "clock", "sec"]),
+    (Quantity::Time, &["t", "clock", "sec", "date", "datum", "stamp"]),
     (Quantity::Pressure, &["p"]),
     (Quantity::Displacement, &["position", "pos", "x", "travel", "course"]),
     (Quantity::Force, &["load", "f", "last", "pull", "charge", "carga"]),
