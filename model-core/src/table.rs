@@ -324,13 +324,16 @@ mod tests {
             change(&mut t);
             t.check()
         };
-        assert_eq!(wrong(|t| drop(t.elastic[0].pop())), Err(TableError::Elastic(1)));
-        assert_eq!(wrong(|t| drop(t.friction.pop())), Err(TableError::Friction));
+        assert_eq!(wrong(|t| t.elastic[0].truncate(5)), Err(TableError::Elastic(1)));
+        assert_eq!(wrong(|t| t.friction.truncate(5)), Err(TableError::Friction));
         assert_eq!(wrong(|t| t.nodes[0] = f32::NAN), Err(TableError::Node(0)));
         assert_eq!(wrong(|t| t.nodes[5] = f32::INFINITY), Err(TableError::Node(5)));
         assert_eq!(wrong(|t| t.nodes[1] = 0.0), Err(TableError::Node(1)));
         assert_eq!(wrong(|t| t.effects[0].parameters[0] = f32::NAN), Err(TableError::Effect(0)));
-        assert_eq!(wrong(|t| drop(t.effects[0].remembered.push(f32::NAN))), Err(TableError::Effect(0)));
+        assert_eq!(
+            wrong(|t| t.effects[0].remembered = [f32::NAN].into_iter().collect()),
+            Err(TableError::Effect(0))
+        );
         assert_eq!(
             wrong(|t| t.tested.pressure_high = Pressure::from_pascals(f32::NAN)),
             Err(TableError::Tested)
