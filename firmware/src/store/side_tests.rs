@@ -85,6 +85,14 @@ fn a_full_flash_and_one_that_fails_are_told_apart() {
 }
 
 #[test]
+fn the_longest_image_fits() {
+    let mut store = open(MockFlash::erased());
+    let longest = [7; image::MAX_LEN];
+    store.commit(Side::Agonist, &longest).expect("room");
+    assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&longest[..]));
+}
+
+#[test]
 fn an_erased_store_holds_nothing_and_takes_everything() {
     let mut store = open(MockFlash::erased());
     store.commit(Side::Agonist, &table(1)).expect("room");

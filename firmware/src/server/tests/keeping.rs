@@ -145,7 +145,6 @@ impl Update for Counted {
 }
 
 #[test]
-#[cfg(feature = "std")]
 fn a_restart_reaches_what_takes_another_firmware() {
     let shared = Shared::new(Settings::default());
     let count = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
