@@ -105,6 +105,40 @@ fn a_search_that_has_not_ended_after_its_most_steps_does_not_claim_an_answer() {
     assert_ne!(found.reach, Reach::Reached);
 }
 
+/// A root, on which Newton's method goes back and forth between two pressures for ever.
+struct Root;
+
+impl Curve<f64> for Root {
+    fn enter(&mut self, _: f64) {}
+
+    fn holds(&self, _: f64) -> bool {
+        true
+    }
+
+    fn force_and_slope(&mut self, p: f64) -> (f64, f64) {
+        (p.signum() * p.abs().sqrt(), 0.5 / p.abs().sqrt())
+    }
+}
+
+#[test]
+fn a_step_back_to_a_pressure_that_was_tried_is_not_taken() {
+    let [low, high, tolerance] = [-1.0, 1.0, 1e-9].map(Pressure::from_pascals);
+    for guess in [0.25, -0.25] {
+        let found = solve(&mut Root, 0.0, Pressure::from_pascals(guess), &Search { low, high, tolerance });
+        assert_eq!((found.pressure.pascals(), found.reach), (0.0, Reach::Reached), "{found:?} from {guess}");
+        assert!(found.steps <= 4, "{found:?}");
+    }
+}
+
+#[test]
+fn no_piece_is_assumed_where_effects_may_bend_the_force() {
+    let m = muscle();
+    let Moment { at_stroke, slopes, context } = &m.moment();
+    let (chain, context) = (&Chain::none(), *context);
+    let whole = Whole { muscle: &m, at_stroke, slopes, chain, context, last: None, effect_slope: 0.0 };
+    assert!([0.0, 76.5e3, 300e3, 600e3].into_iter().all(|pascals| !whole.holds(pascals)));
+}
+
 #[test]
 fn an_end_is_judged_by_what_was_missed_there() {
     // Missed, N, slope, N/Pa, and tolerance, Pa.

@@ -157,3 +157,11 @@ fn a_message_announces_from_one_byte_to_its_longest_and_is_as_long_as_they_need(
     longest[1] = 63;
     assert_eq!(take(&longest), none, "more than a message carries");
 }
+
+#[test]
+fn an_address_is_a_number_from_one_to_eight() {
+    for number in 0..=u8::MAX {
+        let expected = (1..=8).contains(&number).then_some(number);
+        assert_eq!(Address::new(number).map(Address::number), expected);
+    }
+}
