@@ -63,13 +63,14 @@ target=${CARGO_TARGET_DIR:-target}
 # Property tests draw the same cases in every run, so that a failure can be repeated; another number draws other cases.
 export PROPTEST_RNG_SEED="${PROPTEST_RNG_SEED:-1}"
 
+# The programs are built with the features of the whole workspace, as in the tests: those of one package would compile the host and many
+# of its dependencies again.
 browser() {
-    # The features of the whole workspace, as in the tests: other features would compile most dependencies again.
     cargo build --quiet --locked --workspace --bin host && python3 tests/studio.py "$target/debug/host"
 }
 
 packages() {
-    cargo build --quiet --locked --package host --bins && bash packaging/test.sh "$target/debug/pam"
+    cargo build --quiet --locked --workspace --bin pam && bash packaging/test.sh "$target/debug/pam"
 }
 
 language() {

@@ -12,6 +12,7 @@ pub(crate) mod health;
 pub(crate) mod history;
 pub(crate) mod import;
 pub(crate) mod predict;
+pub(crate) mod recording;
 pub(crate) mod stock;
 pub(crate) mod table;
 
@@ -55,7 +56,7 @@ mod tests {
     fn every_published_schema_is_that_of_the_types() {
         published::<super::campaign::Campaign>("pam-campaign-1");
         published::<super::fleet::Batch<'_>>("pam-batch-1");
-        published::<super::bench::Compare<'_>>("pam-compare-1");
+        published::<super::bench::Compare>("pam-compare-1");
         published::<super::bench::Demo<'_>>("pam-demo-1");
         published::<super::bench::Emulate<'_>>("pam-emulate-1");
         published::<super::bench::Plan<'_>>("pam-plan-1");
@@ -89,6 +90,8 @@ mod tests {
         published::<super::fleet::Stock<'_>>("pam-stock-1");
         published::<super::predict::Predict>("pam-predict-1");
         published::<super::stock::StockDocument>("pam-diagnose-stock-1");
+        published::<super::recording::schema::Record>("pam-record-1");
+        published::<super::recording::schema::Run>("pam-run-1");
         published::<super::table::Check>("pam-check-1");
         published::<super::table::Export>("pam-export-1");
         published::<super::table::TableDocument<'_>>("pam-table-1");

@@ -13,6 +13,7 @@
 
 mod access;
 pub mod analysis;
+mod answers;
 mod connections;
 mod events;
 mod orders;

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 use pam_device::emulated::{Emulated, Kind, Stand};
+use pam_device::recorder::side_file;
 use published_schemas::Schemas;
 use serde_json::Value;
 use virtual_bench::presets;
@@ -131,10 +132,17 @@ fn results_of_a_controller_are_valid() {
         "device faults --json",
         "flash t.pam --json --quiet",
         "flash t.pam --json --quiet",
+        "record --quiet --seconds 0.3 -o watched.csv --json",
+        "run --quiet --pressure 100 --seconds 0.3 -o run.csv --json",
+        "run --quiet --force 20 --seconds 0.3 --json",
         "device forget --json",
         "vent --json",
     ] {
         let words: Vec<&str> = call.split(' ').chain(["--port", &port]).collect();
         valid(&all, call, &host(folder, &words));
+    }
+    for recording in ["watched.csv", "run.csv"] {
+        let side = side_file(&folder.join(recording));
+        valid(&all, recording, &std::fs::read_to_string(side).unwrap());
     }
 }

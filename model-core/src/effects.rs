@@ -50,6 +50,7 @@ use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
 mod chain;
+mod change;
 mod context;
 mod fading;
 mod list;
@@ -84,6 +85,7 @@ mod tip_effect;
 mod viscous_damping;
 
 pub use chain::Chain;
+pub use change::{Changed, Class, Owner};
 pub use context::Context;
 pub use fading::{Fading, decay};
 pub use traits::{BenchCheck, Experiment, Imitates, Traits, Vented};

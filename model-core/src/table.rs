@@ -324,14 +324,26 @@ mod tests {
             change(&mut t);
             t.check()
         };
-        assert_eq!(wrong(|t| t.elastic[0].truncate(5)), Err(TableError::Elastic(1)));
-        assert_eq!(wrong(|t| t.friction.truncate(5)), Err(TableError::Friction));
+        assert_eq!(
+            wrong(|t| {
+                t.elastic[0].pop();
+            }),
+            Err(TableError::Elastic(1))
+        );
+        assert_eq!(
+            wrong(|t| {
+                t.friction.pop();
+            }),
+            Err(TableError::Friction)
+        );
         assert_eq!(wrong(|t| t.nodes[0] = f32::NAN), Err(TableError::Node(0)));
         assert_eq!(wrong(|t| t.nodes[5] = f32::INFINITY), Err(TableError::Node(5)));
         assert_eq!(wrong(|t| t.nodes[1] = 0.0), Err(TableError::Node(1)));
         assert_eq!(wrong(|t| t.effects[0].parameters[0] = f32::NAN), Err(TableError::Effect(0)));
         assert_eq!(
-            wrong(|t| t.effects[0].remembered = [f32::NAN].into_iter().collect()),
+            wrong(|t| {
+                let _ = t.effects[0].remembered.push(f32::NAN);
+            }),
             Err(TableError::Effect(0))
         );
         assert_eq!(

@@ -1,7 +1,5 @@
 //! Two recordings side by side: by how much each quantity differs at the same time after the start.
 
-use serde_json::{Value, json};
-
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 use crate::recording::Recording;
@@ -108,20 +106,6 @@ impl Comparison {
             );
         }
         text.trim_end().to_owned()
-    }
-
-    /// The same as JSON.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        let columns: Vec<Value> = self
-            .columns
-            .iter()
-            .map(|c| {
-                json!({ "name": c.name, "unit": c.unit, "rms": c.rms, "mean": c.mean, "largest": c.largest,
-                    "largest_at_s": c.largest_at })
-            })
-            .collect();
-        json!({ "schema": "pam-compare/1", "rows": self.rows, "overlap_s": self.overlap, "columns": columns })
     }
 }
 

@@ -144,10 +144,13 @@ fn forces_are_read_in_every_unit_of_a_balance() {
     }
 }
 
+/// What a column holds at a stroke, mm.
+type Convert = fn(f64) -> f64;
+
 #[test]
 fn strokes_and_lengths_are_read_in_inches_per_cent_and_ratios() {
     // L0 is 100 mm: 4 mm are 4 %.
-    let headers: [(&str, fn(f64) -> f64); 9] = [
+    let headers: [(&str, Convert); 9] = [
         ("Stroke (in)", |x| x / 25.4),
         ("Length [inches]", |x| (100.0 - x) / 25.4),
         ("Contraction [%]", |x| x),

@@ -5,11 +5,24 @@ use model_core::link::messages::{Side, State, Telemetry};
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::{Force, Length, Pressure};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::setpoint_profile::{Quantity, SetpointProfile};
 use super::{Client, tables};
 use pam_data::error::Result;
+
+/// How long a run was beyond what its table can do, or was tested for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Unreached {
+    /// More force than the muscle pulls at that stroke and the highest pressure allowed.
+    pub beyond_blocked_force_s: f64,
+    /// Less force than it pulls there without pressure.
+    pub below_deadband_s: f64,
+    /// At a stroke where more pressure pulls no harder.
+    pub not_rising_s: f64,
+    /// Outside the tested range of the table.
+    pub outside_tested_s: f64,
+}
 
 /// Samples of a run, classified by the table of the first muscle without friction and effects.
 #[derive(Debug)]
@@ -103,16 +116,16 @@ impl Reachability {
         }
     }
 
-    /// The seconds of each, for n samples in a second.
+    /// How long each lasted, for n samples in a second.
     #[must_use]
-    pub fn to_json(&self, per_s: f64) -> Value {
+    pub fn times(&self, per_s: f64) -> Unreached {
         let seconds = |samples: u64| samples as f64 / per_s;
-        json!({
-            "beyond_blocked_force_s": seconds(self.beyond_blocked_force),
-            "below_deadband_s": seconds(self.below_deadband),
-            "not_rising_s": seconds(self.not_rising),
-            "outside_tested_s": seconds(self.outside_tested),
-        })
+        Unreached {
+            beyond_blocked_force_s: seconds(self.beyond_blocked_force),
+            below_deadband_s: seconds(self.below_deadband),
+            not_rising_s: seconds(self.not_rising),
+            outside_tested_s: seconds(self.outside_tested),
+        }
     }
 
     /// Why a force could not be reached: the reason that applied longest.

@@ -16,22 +16,77 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use model_core::link::messages::{Event, Telemetry};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 
-pub use about::{about_device, about_losses, about_start, serial};
+pub use about::{About, Device, Ended, LinkedDevice, StoredTable, serial};
 pub use recover::{Recovered, Tally, recover};
 
 use self::mcap::Encoder;
 use self::part::{Part, part_of};
 use super::messages;
 use pam_data::error::{DataCode, Error, Result};
-use pam_data::output::write_whole;
+use pam_data::output::{json_of, write_whole};
 use pam_data::pluralise::pluralise;
 
 /// Time between two pieces: what a stopped program may lose.
 const PIECE: Duration = Duration::from_millis(100);
 /// Events that the side file lists; more are in the MCAP only.
 const EVENTS: usize = 1_000;
+
+/// How the side file of a growing recording says that it ended; the end replaces it.
+const CUT_OFF: &str = "it was cut off: the program or its computer was stopped";
+
+/// The side file of a recording that grows.
+#[derive(Serialize)]
+struct Growing<'a, A> {
+    #[serde(flatten)]
+    about: &'a A,
+    ended_by: &'static str,
+}
+
+/// The side file of a recording that has ended.
+#[derive(Serialize)]
+struct Whole<'a, A> {
+    #[serde(flatten)]
+    about: &'a A,
+    rows: u64,
+    left_out: u64,
+    events: &'a [Reported],
+}
+
+/// What a device reported without a request. The fields have the order in which viewers show them.
+#[derive(Debug, Serialize)]
+struct Reported {
+    event: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    remedy: Option<&'static str>,
+    text: String,
+    /// Time of the device; null before the first sample.
+    time_s: Option<f64>,
+}
+
+impl Reported {
+    /// An event, and the time of the last sample before it.
+    fn of(event: &Event, last_time_us: Option<u64>) -> Self {
+        let seconds = |time_us: u64| time_us as f64 * 1e-6;
+        let time_s = last_time_us.map(seconds);
+        match event {
+            Event::Fault(report) => Self {
+                event: "fault",
+                remedy: Some(messages::fault(report.fault).remedy),
+                text: messages::report(report),
+                time_s: Some(seconds(report.time_us)),
+            },
+            Event::State(state) => {
+                Self { event: "state", remedy: None, text: messages::state(*state).to_owned(), time_s }
+            }
+            Event::TraceFull => {
+                Self { event: "trace-full", remedy: None, text: "the trace is full".to_owned(), time_s }
+            }
+        }
+    }
+}
 
 /// One file of a recording.
 #[derive(Debug)]
@@ -63,7 +118,7 @@ impl Stream {
 pub struct Recorder {
     streams: Vec<Stream>,
     side: PathBuf,
-    events: Vec<Value>,
+    events: Vec<Reported>,
     rows: u64,
     first_time_us: Option<u64>,
     last_time_us: Option<u64>,
@@ -75,14 +130,15 @@ pub struct Recorder {
 
 impl Recorder {
     /// Begins a recording in all `paths`: a name that ends in `.mcap` becomes MCAP, any other CSV. `about` is what is known
-    /// now, and all that a program which is stopped leaves of it.
+    /// now, and all that a program which is stopped leaves of it: a document of named fields.
     ///
     /// # Errors
     /// [`DataCode::FileUnwritable`], [`DataCode::CallInvalid`] without a path or with one given twice.
-    pub fn create(paths: &[PathBuf], about: &Value) -> Result<Self> {
+    pub fn create(paths: &[PathBuf], about: &impl Serialize) -> Result<Self> {
         let first =
             paths.first().ok_or_else(|| Error::new(DataCode::CallInvalid, "a recording needs a file"))?;
         let begun_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64);
+        let known = json_of(about);
         let (mut streams, mut recovered) = (Vec::new(), Vec::new());
         for (number, path) in paths.iter().enumerate() {
             if paths[..number].contains(path) {
@@ -91,15 +147,13 @@ impl Recorder {
             let (part, kept) = Part::create(path)?;
             recovered.extend(kept);
             let form = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-                Form::Mcap(Box::new(Encoder::new(about, begun_ns).map_err(|e| encoding(path, &e))?))
+                Form::Mcap(Box::new(Encoder::new(&known, begun_ns).map_err(|e| encoding(path, &e))?))
             } else {
                 Form::Csv(String::new(), false)
             };
             streams.push(Stream { part, form });
         }
-        let mut early = about.clone();
-        early["ended_by"] = json!("it was cut off: the program or its computer was stopped");
-        write_side(&side_file(&part_of(first)), &early)?;
+        write_side(&side_file(&part_of(first)), &json_of(&Growing { about, ended_by: CUT_OFF }))?;
         let mut begun = Self {
             streams,
             side: side_file(first),
@@ -154,26 +208,16 @@ impl Recorder {
     /// # Errors
     /// As [`Self::push`].
     pub fn event(&mut self, event: &Event) -> Result<()> {
-        let value = match event {
-            Event::Fault(report) => json!({
-                "time_s": report.time_us as f64 * 1e-6, "event": "fault",
-                "text": messages::report(report), "remedy": messages::fault(report.fault).remedy,
-            }),
-            Event::State(state) => json!({
-                "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "state", "text": messages::state(*state),
-            }),
-            Event::TraceFull => json!({
-                "time_s": self.last_time_us.map(|t| t as f64 * 1e-6), "event": "trace-full", "text": "the trace is full",
-            }),
-        };
+        let reported = Reported::of(event, self.last_time_us);
         let since = self.last_time_us.unwrap_or(0) - self.first_time_us.unwrap_or(0);
+        let message = json_of(&reported).to_string();
         for stream in &mut self.streams {
             if let Form::Mcap(encoder) = &mut stream.form {
-                encoder.event(since, &value).map_err(|e| encoding(stream.part.path(), &e))?;
+                encoder.event(since, &message).map_err(|e| encoding(stream.part.path(), &e))?;
             }
         }
         if self.events.len() < EVENTS {
-            self.events.push(value);
+            self.events.push(reported);
         }
         Ok(())
     }
@@ -215,11 +259,8 @@ impl Recorder {
     ///
     /// # Errors
     /// [`DataCode::FileUnwritable`] when something could not be written, now or before.
-    pub fn finish(mut self, about: &Value) -> Result<PathBuf> {
-        let mut about = about.clone();
-        about["rows"] = json!(self.rows);
-        about["left_out"] = json!(self.skipped);
-        about["events"] = json!(self.events);
+    pub fn finish(mut self, about: &impl Serialize) -> Result<PathBuf> {
+        let about = json_of(&Whole { about, rows: self.rows, left_out: self.skipped, events: &self.events });
         let mut trouble = self.failed.take();
         let mut paths = Vec::new();
         for mut stream in std::mem::take(&mut self.streams) {
@@ -301,6 +342,7 @@ pub fn side_file(recording: &Path) -> PathBuf {
 mod tests {
     use super::*;
     use model_core::link::messages::{Mode, SideSample, State};
+    use serde_json::json;
 
     fn sample(time_us: u64, force_n: f32) -> Telemetry {
         let side = SideSample { force_n, pressure_pa: 1e5 / 3.0, ..SideSample::default() };

@@ -3,7 +3,6 @@
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
-use serde_json::{Value, json};
 
 /// One quantity that differs.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,16 +132,6 @@ impl TableDiff {
             );
         }
         text.trim_end().to_owned()
-    }
-
-    /// The same as JSON.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        json!({
-            "changes": self.changes.iter().map(|c| json!({ "name": c.name, "before": c.before, "after": c.after })).collect::<Vec<_>>(),
-            "force_max_N": self.force.map(|f| f.0),
-            "force_rms_N": self.force.map(|f| f.1),
-        })
     }
 }
 

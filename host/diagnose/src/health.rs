@@ -83,7 +83,7 @@ fn meaning(shape: Shape, sums: &HealthSums) -> (Change, f64) {
 pub fn unit(change: Change) -> &'static str {
     match change {
         Change::ForceDrift => "N/h",
-        other => other.about().parameter.1,
+        other => other.about().changed.size.1,
     }
 }
 

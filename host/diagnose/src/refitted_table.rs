@@ -15,7 +15,7 @@ use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
 use pam_fit::bench::Candidate;
 use pam_fit::predict::predict;
-use pam_fit::table_file::{About, Correction, TableFile, stored_mountings};
+use pam_fit::table_file::{Correction, TableFile};
 use pam_fit::{Options as FitOptions, fit};
 
 /// A refitted table file and how well it does on the recordings.
@@ -42,17 +42,8 @@ pub struct Refitted {
 /// Recordings that cannot be fitted.
 pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagnosis) -> Result<Refitted> {
     let plain = fit(campaign, muscle, &FitOptions::default())?;
-    let about = |fitted: &pam_fit::Fit, corrections: Vec<Correction>| About {
-        muscle: muscle.name.clone(),
-        tool: format!("host {}", env!("CARGO_PKG_VERSION")),
-        fit: fitted.summary.quality(),
-        uncertainty: Some(fitted.stored_uncertainty()),
-        corrections,
-        // Fitted lengths go with fitted dimensions: the table is wrong without them.
-        mountings: stored_mountings(&fitted.solution.problem),
-        ..About::default()
-    };
-    let bare = TableFile { table: plain.table.clone(), about: about(&plain, Vec::new()) };
+    let tool = || format!("host {}", env!("CARGO_PKG_VERSION"));
+    let bare = plain.table_file(tool());
     let before = predict(&bare, campaign)?.rms.unwrap_or(0.0);
     if let Some(remembering) = with_memory(campaign, muscle, diagnosis, before)? {
         return Ok(remembering);
@@ -66,7 +57,8 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         return Ok(without_effects(bare, before, warnings, None));
     }
     let mut left_out = None;
-    let mut with = TableFile { table: plain.table.clone(), about: about(&plain, corrections.clone()) };
+    let mut with = bare.clone();
+    with.about.corrections.clone_from(&corrections);
     with.table.effects = effects.iter().cloned().collect();
     for _ in 0..REFIT_ROUNDS {
         let mut without = with.clone();
@@ -82,9 +74,9 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
             }
         }
         let again = fit(&freed, muscle, &FitOptions::default())?;
-        with.table = again.table.clone();
+        with = again.table_file(tool());
         with.table.effects = effects.iter().cloned().collect();
-        with.about = about(&again, corrections.clone());
+        with.about.corrections.clone_from(&corrections);
         left_out = unseen.zip(again.summary.left_out_pressure_mean_error_pct);
         warnings.clone_from(&again.summary.warnings);
     }

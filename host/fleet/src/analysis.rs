@@ -135,19 +135,12 @@ fn keep_fit(
     for (source, input) in sources.iter_mut().zip(names) {
         source.path.clone_from(&input.name);
     }
-    let about = table_file::About {
-        muscle: item.muscle.clone(),
-        // The date of the run would make equal inputs give different files.
-        date: item.tags.get("date").cloned().unwrap_or_default(),
-        tool: options.tool.clone(),
-        sources,
-        fit: fitted.summary.quality(),
-        uncertainty: Some(fitted.stored_uncertainty()),
-        corrections: Vec::new(),
-        mountings: table_file::stored_mountings(&fitted.solution.problem),
-        earlier_load: None,
-    };
-    match (TableFile { table: fitted.table.clone(), about }).to_bytes() {
+    let mut table = fitted.table_file(options.tool.clone());
+    table.about.muscle.clone_from(&item.muscle);
+    // The date of the run would make equal inputs give different files.
+    table.about.date = item.tags.get("date").cloned().unwrap_or_default();
+    table.about.sources = sources;
+    match table.to_bytes() {
         Ok(bytes) => result.files.push(("table.pam".into(), bytes)),
         Err(error) => result.fail(Stage::Fit, &inputs.named(error), item),
     }

@@ -17,12 +17,13 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::json_of;
 use pam_device::error::DeviceCode;
 use pam_device::reachability::Reachability;
-use pam_device::recorder::{about_losses, about_start};
+use pam_device::recorder::LinkedDevice;
 use pam_device::run::{Plan, arm, run, vent};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_device::watch::{Happened, watch};
-use pam_device::{Address, Client, VentLine, available, messages, tables};
+use pam_device::{Address, Client, Losses, VentLine, available, messages, tables};
 use pyo3::prelude::*;
+use serde::Serialize;
 
 use crate::arrays::loads;
 use crate::error::{raised, wrong};
@@ -33,6 +34,18 @@ use crate::warnings::warn;
 const UNATTENDED: Duration = Duration::from_secs(2);
 /// Samples of a recording that Python may leave waiting: a minute at 1 kHz.
 const BACKLOG: usize = 60_000;
+
+/// A controller as Python gets it.
+#[derive(Serialize)]
+struct Info {
+    #[serde(flatten)]
+    device: LinkedDevice,
+    state: &'static str,
+    mode: &'static str,
+    time_s: f64,
+    fault: Option<String>,
+    losses: Losses,
+}
 
 /// One sample as Python gets it: time, pressure, stroke, force, pressure command, setpoint, force of the table, state, mode.
 type Row = (f64, f64, f64, f64, f64, f64, f64, &'static str, &'static str);
@@ -242,15 +255,18 @@ impl Link {
     /// Identity, tables, settings, and state, as a dict.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.with(py, |client| {
-            let mut about = about_start("pam-python-device/1", client)?["device"].take();
+            let device = LinkedDevice::of(client)?;
             let status = client.call::<GetStatus>(&())?;
-            about["state"] = messages::state(status.state).into();
-            about["mode"] = messages::mode(status.mode).into();
-            about["time_s"] = (status.time_us as f64 * 1e-6).into();
             let faults = client.call::<GetFaults>(&())?;
-            about["fault"] = faults.latched.as_ref().map(messages::report).into();
-            about["losses"] = about_losses(client.losses());
-            Ok(about.to_string())
+            let info = Info {
+                device,
+                state: messages::state(status.state),
+                mode: messages::mode(status.mode),
+                time_s: status.time_us as f64 * 1e-6,
+                fault: faults.latched.as_ref().map(messages::report),
+                losses: client.losses(),
+            };
+            Ok(json_of(&info).to_string())
         })?;
         loads(py, &text)
     }

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use pam_data::date;
 use pam_data::recording::Campaign as HostCampaign;
-use pam_fit::table_file::{self, About, TableFile};
 use pam_fit::{Fit as HostFit, Options};
 use pam_report::fit_page;
 use pyo3::prelude::*;
@@ -37,17 +36,9 @@ impl Fit {
     /// The table.
     #[getter]
     fn table(&self) -> Table {
-        let about = About {
-            muscle: self.fit.summary.muscle.clone(),
-            date: date::now_utc(),
-            tool: format!("pamtools {}", env!("CARGO_PKG_VERSION")),
-            fit: self.fit.summary.quality(),
-            uncertainty: Some(self.fit.stored_uncertainty()),
-            mountings: table_file::stored_mountings(&self.fit.solution.problem),
-            earlier_load: None,
-            ..About::default()
-        };
-        Table(TableFile { table: self.fit.table.clone(), about })
+        let mut file = self.fit.table_file(format!("pamtools {}", env!("CARGO_PKG_VERSION")));
+        file.about.date = date::now_utc();
+        Table(file)
     }
 
     /// The recordings that were fitted.

@@ -22,8 +22,9 @@ tests=("$@")
 # The build folder of the workspace, so that crates that are built already are reused.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}
 "$work/env/bin/pip" install --quiet --find-links "$work/wheels" --config-settings=build-args='--profile dev' "$root/host/python"
-cargo run --quiet --locked --manifest-path "$root/Cargo.toml" -p virtual-bench -- record --muscle mini --protocol thesis -o "$work/bench"
-cargo build --quiet --locked --manifest-path "$root/Cargo.toml" -p host --bin host
+# With the features of the whole workspace, as in its tests: others would compile the host and many of its dependencies again.
+cargo build --quiet --locked --manifest-path "$root/Cargo.toml" --workspace --bin host --bin virtual-bench
+"$CARGO_TARGET_DIR/debug/virtual-bench" record --muscle mini --protocol thesis -o "$work/bench"
 export PAM_HOST="$CARGO_TARGET_DIR/debug/host"
 "$work/env/bin/pip" install --quiet --find-links "$work/wheels" pandas polars pyarrow scikit-learn matplotlib
 if [[ " ${tests[*]} " == *" fleet "* ]]; then

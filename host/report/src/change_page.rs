@@ -87,7 +87,7 @@ fn changes(r: &ChangeReport) -> Section {
             words::remedy(m.change),
             fixed(m.probability, 2),
             fixed(m.class_probability, 2),
-            m.change.about().law,
+            m.change.about().changed.law,
             words::since(&m.since),
             words::owner(m.owner)
         ));

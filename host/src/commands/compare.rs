@@ -9,7 +9,7 @@ use super::recordings;
 use super::reports::{self, Reports};
 use crate::console::Console;
 use crate::documents::{bench, text};
-use pam_data::compare::{Comparison, compare};
+use pam_data::compare::compare;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{printed, to_standard_output};
@@ -103,29 +103,12 @@ impl Arguments {
             compare_page::page(&a, &b, &found)
         })?;
         if self.json {
-            console.result(text(&to_document(&found))?);
+            console.result(text(&bench::Compare::of(&found))?);
         } else if taken {
             console.note(found.to_text());
         } else {
             console.result(found.to_text());
         }
         Ok(())
-    }
-}
-
-fn to_document(found: &Comparison) -> bench::Compare<'_> {
-    let columns = found.columns.iter().map(|c| bench::Column {
-        name: c.name,
-        unit: c.unit,
-        rms: c.rms,
-        mean: c.mean,
-        largest: c.largest,
-        largest_at_s: c.largest_at,
-    });
-    bench::Compare {
-        schema: "pam-compare/1",
-        rows: found.rows,
-        overlap_s: found.overlap,
-        columns: columns.collect(),
     }
 }

@@ -13,6 +13,7 @@ use crate::console::Console;
 use crate::demo::campaign::{Made, record};
 use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
+use crate::documents::recording::Run;
 use crate::documents::{bench, text};
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
@@ -20,7 +21,8 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::progress::Progress;
 use pam_device::emulated::{Emulated, Kind, Stand};
-use pam_device::recorder::{Recorder, about_losses, about_start};
+use pam_device::recorder::{About, Ended, Recorder};
+use pam_device::run::Ending;
 use pam_device::{Client, regulator, tables};
 use pam_fit::Fit;
 use pam_fit::predict::predict;
@@ -28,7 +30,7 @@ use pam_fit::{Options, fit};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
-use pam_fit::table_file::{self, About, TableFile};
+use pam_fit::table_file::{self, TableFile};
 
 /// Device seconds in a second: faster than a real controller, to shorten the demonstration.
 const SPEED: u32 = 4;
@@ -218,13 +220,12 @@ impl Arguments {
 
     fn keep(&self, client: &mut Client, track: &Track) -> Result<PathBuf> {
         let path = self.output.join(format!("run-{}-{}.csv", track.law.key(), track.task.name()));
-        let mut about = about_start("pam-run/1", client)?;
+        let mut about = Run::watched(About::of("pam-run/1", client)?);
         let mut recorder = Recorder::create(std::slice::from_ref(&path), &about)?;
         for sample in &track.samples {
             recorder.push(sample)?;
         }
-        about["losses"] = about_losses(client.losses());
-        about["ended_by"] = "time".into();
+        about.ended = Some(Ended::of(&Ok(Ending::Done), client.losses()));
         recorder.finish(&about)
     }
 }
@@ -258,17 +259,9 @@ fn fit_campaign(made: &Made, folder: &Path) -> Result<(MuscleDescription, Campai
     let campaign = Reader::of(&muscle).campaign(&made.recordings)?;
     let fitted = fit(&campaign, &muscle, &Options::default())?;
     let hashes = made.recordings.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
-    let about = About {
-        muscle: muscle.name.clone(),
-        date: date::now_utc(),
-        tool: format!("host {} demo", env!("CARGO_PKG_VERSION")),
-        sources: table_file::sources(&campaign, &made.recordings, hashes),
-        fit: fitted.summary.quality(),
-        uncertainty: Some(fitted.stored_uncertainty()),
-        corrections: Vec::new(),
-        ..About::default()
-    };
-    let table = TableFile { table: fitted.table.clone(), about };
+    let mut table = fitted.table_file(format!("host {} demo", env!("CARGO_PKG_VERSION")));
+    table.about.date = date::now_utc();
+    table.about.sources = table_file::sources(&campaign, &made.recordings, hashes);
     table.write(folder.join("muscle.pam"))?;
     Ok((muscle, campaign, fitted, table))
 }

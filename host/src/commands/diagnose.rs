@@ -4,7 +4,7 @@
 pub(crate) mod reference;
 pub(crate) mod stock;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -22,13 +22,13 @@ use pam_data::output::{Turn, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
-use pam_diagnose::{Options, next_experiment::next_experiment, refitted_table};
+use pam_diagnose::{Diagnosis, Options, next_experiment::next_experiment, refitted_table};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
-use pam_fit::recording_table;
+use pam_fit::{Fit, RecordingResidual, recording_table};
 
 use crate::progress::ProgressLine;
-use pam_data::recording::Reader;
+use pam_data::recording::{Campaign, Reader};
 use pam_fit::table_file::{self, TableFile};
 use pam_report::{diagnose_page, document, history_text, wording};
 
@@ -117,34 +117,14 @@ impl Arguments {
         for warning in &campaign.warnings {
             console.warning(warning);
         }
-        let read_hashes = hashes.clone();
         let table = self.table.as_ref().map(TableFile::read).transpose()?;
-        let geometry = muscle.geometry();
         let progress = SharedProgress::new(Arc::new(ProgressLine::new(&watched, "diagnosing")));
         let checks = Checks::read(&self.check)?;
         let options = Options { muscle: muscle.name.clone(), checks, given, progress };
-        let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
+        let mut answer = pam_diagnose::history::diagnose(&campaign, &muscle.geometry(), &options)?;
         let diagnosed = start.elapsed();
-        // One blocked force for one campaign: that of `host fit`, whose residuals by recording are shown, too.
-        let plain = if answer.judged() {
-            pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default()).ok()
-        } else {
-            None
-        };
-        if let Some(plain) = &plain {
-            answer.blocked_force_N = plain.summary.blocked_force_N;
-        }
-        if let Some(table) = &table {
-            let predicted = predict(table, &campaign)?;
-            if let Some(rms) = predicted.rms {
-                answer.misfit_rms_N = rms;
-            }
-        }
-        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty() && !is_from_history(m));
-        let refitted = (self.output.is_some() || confusable).then(|| {
-            options.progress.stage("fitting the table with the named effects", 0);
-            refitted_table::refit(&campaign, &muscle, &answer)
-        });
+        let plain = measure_errors(&mut answer, &campaign, &muscle, table.as_ref())?;
+        let refitted = self.refit(&campaign, &muscle, &answer, &options);
         // The progress line is removed before other output.
         drop(options);
         console.detail(format!("diagnosed in {:.3} s", diagnosed.as_secs_f64()));
@@ -155,6 +135,7 @@ impl Arguments {
             self.reports.file(),
             self.reports.figures.as_deref(),
         ])?;
+        let from = reports::provenance().muscle(&muscle).files(&self.recordings.files, &hashes);
         match refitted {
             Some(Ok(refitted)) => self.with_model(console, &campaign, hashes, refitted, &mut answer)?,
             // Without a requested table a failed refit only costs the advice.
@@ -171,31 +152,40 @@ impl Arguments {
         if let Some(path) = &self.json {
             write_whole(path, (document::diagnosis_json(&answer) + "\n").as_bytes())?;
         }
-        let from = reports::provenance().muscle(&muscle).files(&self.recordings.files, &read_hashes);
         let residuals = plain.as_ref().map_or(&[][..], |plain| &plain.summary.recordings);
         self.reports.write(console, &from, || {
-            diagnose_page::page_with_residuals(&answer, &geometry, &campaign, residuals)
+            diagnose_page::page_with_residuals(&answer, &muscle.geometry(), &campaign, residuals)
         })?;
-        if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            let history = answer.history.as_ref().map(|h| format!("\n{}", history_text::text(h)));
-            let residuals =
-                plain.map(|plain| recording_table(&plain.summary.recordings)).filter(|t| !t.is_empty());
-            let residuals = residuals.map(|table| format!("\nOf the table without effects: {table}\n"));
-            let words =
-                wording::summary(&answer) + &residuals.unwrap_or_default() + &history.unwrap_or_default();
+        if self.json.as_deref() != Some(Path::new("-")) {
+            let words = words(&answer, residuals);
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
         Ok(())
     }
 
+    /// The table with the named effects, where it is written or the advice depends on it.
+    fn refit(
+        &self,
+        campaign: &Campaign,
+        muscle: &MuscleDescription,
+        answer: &Diagnosis,
+        options: &Options,
+    ) -> Option<Result<refitted_table::Refitted>> {
+        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty() && !is_from_history(m));
+        (self.output.is_some() || confusable).then(|| {
+            options.progress.stage("fitting the table with the named effects", 0);
+            refitted_table::refit(campaign, muscle, answer)
+        })
+    }
+
     fn with_model(
         &self,
         console: &Console,
-        campaign: &pam_data::recording::Campaign,
+        campaign: &Campaign,
         hashes: Vec<String>,
         mut refitted: refitted_table::Refitted,
-        answer: &mut pam_diagnose::Diagnosis,
+        answer: &mut Diagnosis,
     ) -> Result<()> {
         let tested = refitted.file.table.tested;
         let (low, high) = (tested.pressure_low.pascals(), tested.pressure_high.pascals());
@@ -230,4 +220,36 @@ impl Arguments {
         }
         Ok(())
     }
+}
+
+/// The errors of the table without effects, and of the given table, on the recordings. One blocked force for one campaign: that of
+/// `host fit`.
+fn measure_errors(
+    answer: &mut Diagnosis,
+    campaign: &Campaign,
+    muscle: &MuscleDescription,
+    table: Option<&TableFile>,
+) -> Result<Option<Fit>> {
+    let plain = answer.judged().then(|| pam_fit::fit(campaign, muscle, &pam_fit::Options::default()).ok());
+    let plain = plain.flatten();
+    if let Some(plain) = &plain {
+        answer.blocked_force_N = plain.summary.blocked_force_N;
+    }
+    if let Some(rms) = table.map(|table| predict(table, campaign)).transpose()?.and_then(|p| p.rms) {
+        answer.misfit_rms_N = rms;
+    }
+    Ok(plain)
+}
+
+/// The answer as text, with the residuals of the table without effects by recording.
+fn words(answer: &Diagnosis, residuals: &[RecordingResidual]) -> String {
+    let mut words = wording::summary(answer);
+    let table = recording_table(residuals);
+    if !table.is_empty() {
+        words += &format!("\nOf the table without effects: {table}\n");
+    }
+    if let Some(history) = &answer.history {
+        words += &format!("\n{}", history_text::text(history));
+    }
+    words
 }

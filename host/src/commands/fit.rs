@@ -1,6 +1,6 @@
 //! `host fit`: recordings to a table.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -8,12 +8,13 @@ use clap::Args;
 use super::recordings::Recordings;
 use super::reports::{self, Reports};
 use crate::console::Console;
+use crate::documents::text;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{Turn, to_standard_output, write_whole};
 use pam_data::pluralise::pluralise;
-use pam_fit::{Options, fit_with_progress};
+use pam_fit::{Options, Summary, fit_with_progress};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
@@ -75,13 +76,7 @@ impl Arguments {
     /// # Errors
     /// What is wrong with the input, or an output that cannot be written.
     pub fn run(self, console: &Console) -> Result<()> {
-        if let Some(weight) = self.smoothing
-            && !(weight.is_finite() && weight >= 0.0)
-        {
-            return Err(Error::new(DataCode::CallInvalid, "a smoothing weight must be a number from 0 up")
-                .value(weight.to_string())
-                .help("1e-3 allows much curvature, 10 is nearly straight; without the option it is chosen automatically"));
-        }
+        self.check_smoothing()?;
         let table = ("-o", self.output.as_deref());
         to_standard_output(&[table, ("--json", self.json.as_deref()), ("--report", self.reports.file())])?;
         let start = Instant::now();
@@ -95,7 +90,46 @@ impl Arguments {
             start.elapsed().as_secs_f64()
         ));
         let started = Instant::now();
-        let options = Options {
+        let options = self.options();
+        let progress = ProgressLine::new(&watched, "fitting");
+        let fitted = fit_with_progress(&campaign, &muscle, &options, &progress)?;
+        drop(progress);
+        console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
+        let from = reports::provenance().muscle(&muscle).files(&self.recordings.files, &hashes);
+        let mut table = fitted.table_file(format!("host {}", env!("CARGO_PKG_VERSION")));
+        table.about.date = date::now_utc();
+        table.about.sources = table_file::sources(&campaign, &self.recordings.files, hashes);
+        let _turn = Turn::of([
+            self.output.as_deref(),
+            self.json.as_deref(),
+            self.reports.file(),
+            self.reports.figures.as_deref(),
+        ])?;
+        self.write(&table, &fitted.summary)?;
+        self.reports.write(console, &from, || fit_page::page(&fitted, &campaign, &options))?;
+        for warning in &fitted.summary.warnings {
+            console.warning(warning);
+        }
+        if self.json.as_deref() != Some(Path::new("-")) {
+            console.note(fitted.summary.to_string());
+        }
+        console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
+        self.judge(&fitted.summary.faults, console)
+    }
+
+    fn check_smoothing(&self) -> Result<()> {
+        match self.smoothing {
+            Some(weight) if !(weight.is_finite() && weight >= 0.0) => {
+                Err(Error::new(DataCode::CallInvalid, "a smoothing weight must be a number from 0 up")
+                    .value(weight.to_string())
+                    .help("1e-3 allows much curvature, 10 is nearly straight; without the option it is chosen automatically"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn options(&self) -> Options {
+        Options {
             order: usize::from(self.order),
             tip_correction: self.tip_correction,
             smoothing: self.smoothing,
@@ -103,49 +137,23 @@ impl Arguments {
             fit_lengths: self.fit_lengths,
             physical: self.physical,
             as_described: self.as_described,
-        };
-        let files = self.recordings.files.clone();
-        let progress = ProgressLine::new(&watched, "fitting");
-        let fitted = fit_with_progress(&campaign, &muscle, &options, &progress)?;
-        drop(progress);
-        console.detail(format!("fitted in {:.3} s", started.elapsed().as_secs_f64()));
-        let read_hashes = hashes.clone();
-        let about = table_file::About {
-            muscle: muscle.name.clone(),
-            date: date::now_utc(),
-            tool: format!("host {}", env!("CARGO_PKG_VERSION")),
-            sources: table_file::sources(&campaign, &files, hashes),
-            fit: fitted.summary.quality(),
-            uncertainty: Some(fitted.stored_uncertainty()),
-            corrections: Vec::new(),
-            mountings: table_file::stored_mountings(&fitted.solution.problem),
-            earlier_load: None,
-        };
-        let table = TableFile { table: fitted.table.clone(), about };
-        let json = serde_json::to_string_pretty(&fitted.summary)
-            .map_err(|e| Error::new(DataCode::FileUnwritable, e.to_string()))?;
-        let _turn = Turn::of([
-            self.output.as_deref(),
-            self.json.as_deref(),
-            self.reports.file(),
-            self.reports.figures.as_deref(),
-        ])?;
-        let faults = &fitted.summary.faults;
-        if let Some(path) = self.output.as_ref().filter(|_| faults.is_empty() || self.force) {
+        }
+    }
+
+    /// Writes the table, unless it is useless for control and not forced, and the figures.
+    fn write(&self, table: &TableFile, summary: &Summary) -> Result<()> {
+        let json = text(summary)?;
+        if let Some(path) = self.output.as_ref().filter(|_| summary.faults.is_empty() || self.force) {
             table.write(path)?;
         }
-        if let Some(path) = &self.json {
-            write_whole(path, format!("{json}\n").as_bytes())?;
+        match &self.json {
+            Some(path) => write_whole(path, format!("{json}\n").as_bytes()),
+            None => Ok(()),
         }
-        let from = reports::provenance().muscle(&muscle).files(&files, &read_hashes);
-        self.reports.write(console, &from, || fit_page::page(&fitted, &campaign, &options))?;
-        for warning in &fitted.summary.warnings {
-            console.warning(warning);
-        }
-        if self.json.as_deref() != Some(std::path::Path::new("-")) {
-            console.note(fitted.summary.to_string());
-        }
-        console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
+    }
+
+    /// A table with faults is an error, or a warning with `--force`.
+    fn judge(&self, faults: &[String], console: &Console) -> Result<()> {
         if faults.is_empty() {
             return Ok(());
         }

@@ -7,7 +7,6 @@ use model_core::check;
 use model_core::image;
 use model_core::link::endpoints::{GetInfo, Restart};
 use model_core::link::messages::Side;
-use serde_json::Value;
 
 use super::port::{Muscle, PortOption};
 use crate::console::Console;
@@ -126,20 +125,25 @@ impl Arguments {
         Ok(())
     }
 
-    fn compare(&self, before: Option<&[u8]>, file: &TableFile, console: &Console) -> Value {
+    fn compare(
+        &self,
+        before: Option<&[u8]>,
+        file: &TableFile,
+        console: &Console,
+    ) -> Option<document::Difference> {
         let Some(before) = before else {
             console.note("the device has no table yet");
-            return Value::Null;
+            return None;
         };
         match image::read(before) {
             Ok(table) => {
                 let difference = table_diff::between(&table, &file.table);
                 console.note(format!("device → {}:\n{}", file.about.muscle, difference.to_text()));
-                difference.to_json()
+                Some(document::Difference::of(difference))
             }
             Err(e) => {
                 console.warning(format!("the device's table cannot be read by this version: {e}"));
-                Value::Null
+                None
             }
         }
     }

@@ -55,7 +55,7 @@ fn verdict(verdict: Verdict) -> &'static str {
 fn document(assessment: &Assessment) -> Health {
     let change = |finding: &pam_diagnose::health::Finding| Change {
         effect: finding.change.name(),
-        parameter: finding.change.about().parameter.0,
+        parameter: finding.change.about().changed.size.0,
         value: finding.size,
         interval: [finding.interval.0, finding.interval.1],
         unit: unit(finding.change),
@@ -95,7 +95,7 @@ fn words(assessment: &Assessment) -> String {
                 lines.push(format!(
                     "  {}: {} {}{separator}{unit} (95 %: {} to {}), {:.0} % of the residual",
                     about.name,
-                    about.parameter.0,
+                    about.changed.size.0,
                     number(finding.size),
                     number(finding.interval.0),
                     number(finding.interval.1),

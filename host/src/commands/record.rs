@@ -5,19 +5,19 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use model_core::link::endpoints::GetInfo;
-use serde_json::json;
 
 use super::interrupt::interrupts;
 use super::port::PortOption;
 use super::recording_files::{begin, end, positive, refuse_existing, warn_of_losses};
 use crate::change_watch::{self, ReferenceOptions};
 use crate::console::Console;
+use crate::documents::recording::{Record, RecordEnd, Recorded};
 use crate::documents::{bench, text};
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::json_of;
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
-use pam_device::recorder::{about_losses, about_start, recover};
-use pam_device::run::Ending;
+use pam_device::recorder::{About, Ended, recover};
 use pam_device::watch::{Happened, watch};
 
 use crate::progress::ProgressLine;
@@ -78,8 +78,8 @@ impl Arguments {
         let mut client = self.port.connect(console)?;
         let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
         let every_ticks = self.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
-        let mut about = about_start("pam-record/1", &mut client)?;
-        about["samples_per_s"] = json!(ticks / f64::from(every_ticks));
+        let about = About::of("pam-record/1", &mut client)?;
+        let mut about = Record { about, samples_per_s: ticks / f64::from(every_ticks), end: None };
         let Some(mut recorder) = begin(&output, &about, console)? else {
             return Err(Error::new(DataCode::CallInvalid, "a recording needs a file"));
         };
@@ -107,17 +107,13 @@ impl Arguments {
         );
         drop(progress);
         let losses = client.losses().since(before);
-        about["losses"] = about_losses(losses);
-        about["ended_by"] = json!(match &watched {
-            Ok(Ending::Done) => "time".to_owned(),
-            Ok(Ending::Stopped) => "interrupt".to_owned(),
-            Err(e) => e.to_string(),
-        });
         let changed = change_watch::finish(changed);
-        about["changed"] = json!(changed.as_ref().map(|c| &c.1));
+        about.end = Some(RecordEnd {
+            ended: Ended::of(&watched, losses),
+            changed: changed.as_ref().map(|c| c.1.clone()),
+            files: output.iter().map(|f| f.display().to_string()).collect(),
+        });
         let rows = recorder.rows();
-        about["rows"] = json!(rows);
-        about["files"] = json!(output.iter().map(|f| f.display().to_string()).collect::<Vec<_>>());
         let kept = end(recorder, &about, console);
         if let Err(error) = &watched
             && kept.is_ok()
@@ -133,7 +129,7 @@ impl Arguments {
         kept?;
         warn_of_losses(losses, console);
         console.result(if self.json {
-            format!("{about:#}")
+            format!("{:#}", json_of(&Recorded { record: &about, rows }))
         } else {
             format!("{} in {names}, {} missing", pluralise(rows, "sample"), losses.samples)
         });

@@ -6,7 +6,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::pluralise::pluralise;
 use pam_device::Losses;
 use pam_device::recorder::Recorder;
-use serde_json::Value;
+use serde::Serialize;
 
 use crate::console::Console;
 
@@ -36,7 +36,11 @@ pub(super) fn refuse_existing(files: &[PathBuf], replace: bool) -> Result<()> {
 }
 
 /// Begins a recording in these files; `None` without any.
-pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Result<Option<Recorder>> {
+pub(super) fn begin(
+    files: &[PathBuf],
+    about: &impl Serialize,
+    console: &Console,
+) -> Result<Option<Recorder>> {
     if files.is_empty() {
         return Ok(None);
     }
@@ -54,7 +58,7 @@ pub(super) fn begin(files: &[PathBuf], about: &Value, console: &Console) -> Resu
 }
 
 /// Ends a recording; `about` describes how it went.
-pub(super) fn end(recorder: Recorder, about: &Value, console: &Console) -> Result<PathBuf> {
+pub(super) fn end(recorder: Recorder, about: &impl Serialize, console: &Console) -> Result<PathBuf> {
     if recorder.skipped() > 0 {
         console.warning(format!(
             "{} left out: not finite, or not later than the one before",

@@ -5,24 +5,44 @@
 
 use serde::Serialize;
 
+use pam_data::compare::Comparison;
 use pam_diagnose::isolability::Isolability;
 
 /// `host compare --json`: B minus A.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub(crate) struct Compare<'a> {
+pub(crate) struct Compare {
     pub schema: &'static str,
     pub rows: usize,
     pub overlap_s: f64,
-    pub columns: Vec<Column<'a>>,
+    pub columns: Vec<Column>,
+}
+
+impl Compare {
+    pub(crate) fn of(found: &Comparison) -> Self {
+        let columns = found.columns.iter().map(|c| Column {
+            name: c.name,
+            unit: c.unit,
+            rms: c.rms,
+            mean: c.mean,
+            largest: c.largest,
+            largest_at_s: c.largest_at,
+        });
+        Self {
+            schema: "pam-compare/1",
+            rows: found.rows,
+            overlap_s: found.overlap,
+            columns: columns.collect(),
+        }
+    }
 }
 
 /// One quantity.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub(crate) struct Column<'a> {
-    pub name: &'a str,
-    pub unit: &'a str,
+pub(crate) struct Column {
+    pub name: &'static str,
+    pub unit: &'static str,
     pub rms: f64,
     pub mean: f64,
     pub largest: f64,

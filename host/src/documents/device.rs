@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use pam_device::recorder::Device;
+use pam_device::table_diff::TableDiff;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -15,7 +17,8 @@ pub(crate) struct Info {
     pub schema: &'static str,
     /// Identity, tables and settings, as every recording holds them.
     #[serde(flatten)]
-    pub device: Map<String, Value>,
+    #[cfg_attr(test, schemars(with = "super::recording::schema::Device"))]
+    pub device: Device,
     pub link_schema: String,
     pub muscles: u8,
     pub table_capacity: u32,
@@ -296,7 +299,7 @@ pub(crate) struct Flash {
     pub port: String,
     pub crc: String,
     /// Between the device's table and the new one; null where there is none to compare with.
-    pub difference: Value,
+    pub difference: Option<Difference>,
     pub written: bool,
     /// Where the device's former table was saved.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -305,6 +308,37 @@ pub(crate) struct Flash {
     pub generation: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirmed_after_restart: Option<bool>,
+}
+
+/// The difference between two tables.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Difference {
+    /// Quantities that differ; empty for equal tables.
+    pub changes: Vec<Change>,
+    /// Of the force over the new table's tested range; null where no force can be computed.
+    pub force_max_N: Option<f64>,
+    pub force_rms_N: Option<f64>,
+}
+
+/// One quantity that differs, with its unit.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Change {
+    pub after: String,
+    pub before: String,
+    pub name: String,
+}
+
+impl Difference {
+    pub(crate) fn of(found: TableDiff) -> Self {
+        let changes = found.changes.into_iter();
+        Self {
+            changes: changes.map(|c| Change { after: c.after, before: c.before, name: c.name }).collect(),
+            force_max_N: found.force.map(|f| f.0),
+            force_rms_N: found.force.map(|f| f.1),
+        }
+    }
 }
 
 /// `host vent --json`.

@@ -7,18 +7,19 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
-use serde_json::{Value, json};
 
 use super::access::{same, token};
+use super::answers::{Compared, Curves, Diagnosed, Fitted, LoadLine, Recordings};
 use crate::change_watch::Reference;
 use crate::console::Console;
 use crate::demo::campaign::record;
+use crate::documents::bench::Compare;
 use pam_data::compare::compare;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Hashes, Reader, Recording};
-use pam_fit::table_file::{self, About, TableFile};
+use pam_fit::table_file;
 use pam_fit::{Options, fit};
 use pam_report::{diagnose_page, fit_page};
 
@@ -153,7 +154,7 @@ impl Analysis {
         &self,
         name: &str,
         pieces: impl IntoIterator<Item = Result<B>>,
-    ) -> Result<Value> {
+    ) -> Result<Recordings> {
         // Only letters, digits, dots, dashes: a name can never lead out of the folder.
         let plain: String = name
             .chars()
@@ -191,23 +192,22 @@ impl Analysis {
     ///
     /// # Errors
     /// As [`record`].
-    pub fn example(&self, muscle: &str) -> Result<Value> {
+    pub fn example(&self, muscle: &str) -> Result<Recordings> {
         let made = record(muscle, 1, &self.folder.join("example"))?;
         let text = std::fs::read_to_string(&made.muscle).map_err(|e| Error::unreadable(&made.muscle, &e))?;
         self.known().recordings = made.recordings.into_iter().map(|p| (name_of(&p), p)).collect();
-        let mut list = self.list();
-        list["muscle"] = json!(text);
-        Ok(list)
+        Ok(Recordings { muscle: Some(text), ..self.list() })
     }
 
     /// What there is.
     #[must_use]
-    pub fn list(&self) -> Value {
+    pub fn list(&self) -> Recordings {
         let known = self.known();
-        json!({
-            "recordings": known.recordings.iter().map(|r| r.0.clone()).collect::<Vec<_>>(),
-            "table": known.table.as_ref().map(|t| t.display().to_string()),
-        })
+        Recordings {
+            recordings: known.recordings.iter().map(|r| r.0.clone()).collect(),
+            table: known.table.as_ref().map(|t| t.display().to_string()),
+            muscle: None,
+        }
     }
 
     fn one(&self, number: usize) -> Result<(String, Recording)> {
@@ -228,30 +228,28 @@ impl Analysis {
     ///
     /// # Errors
     /// A recording that is not there or cannot be read.
-    pub fn curves(&self, number: usize) -> Result<Value> {
+    pub fn curves(&self, number: usize) -> Result<Curves> {
         let (name, r) = self.one(number)?;
         let every = r.len().div_ceil(POINTS).max(1);
         let thin = |v: &[f64], scale: f64| v.iter().step_by(every).map(|x| x * scale).collect::<Vec<_>>();
         let start = r.time.first().copied().unwrap_or(0.0);
-        Ok(json!({
-            "name": name,
-            "t": r.time.iter().step_by(every).map(|t| t - start).collect::<Vec<_>>(),
-            "F": r.force.as_ref().map(|f| thin(f, 1.0)),
-            "P": thin(&r.pressure, 1e-3),
-            "x": thin(&r.stroke, 1e3),
-            "rows": r.len(),
-        }))
+        Ok(Curves {
+            name,
+            t: r.time.iter().step_by(every).map(|t| t - start).collect(),
+            F: r.force.as_ref().map(|f| thin(f, 1.0)),
+            P: thin(&r.pressure, 1e-3),
+            x: thin(&r.stroke, 1e3),
+            rows: r.len(),
+        })
     }
 
     /// Two recordings, in numbers.
     ///
     /// # Errors
     /// As [`compare`].
-    pub fn compare(&self, a: usize, b: usize) -> Result<Value> {
+    pub fn compare(&self, a: usize, b: usize) -> Result<Compared> {
         let found = compare(&self.one(a)?.1, &self.one(b)?.1)?;
-        let mut value = found.to_json();
-        value["text"] = json!(found.to_text());
-        Ok(value)
+        Ok(Compared { found: Compare::of(&found), text: found.to_text() })
     }
 
     fn read(&self, muscle: &str) -> Result<(MuscleDescription, Campaign, Vec<PathBuf>, Vec<String>)> {
@@ -269,23 +267,15 @@ impl Analysis {
     ///
     /// # Errors
     /// As [`fit`], and for a muscle description that is not right.
-    pub fn fit(&self, muscle: &str) -> Result<Value> {
+    pub fn fit(&self, muscle: &str) -> Result<Fitted> {
         let (muscle, campaign, files, hashes) = self.read(muscle)?;
         let options = Options::default();
         let fitted = fit(&campaign, &muscle, &options)?;
-        let about = About {
-            muscle: muscle.name.clone(),
-            date: date::now_utc(),
-            tool: format!("host {} studio", env!("CARGO_PKG_VERSION")),
-            sources: table_file::sources(&campaign, &files, hashes),
-            fit: fitted.summary.quality(),
-            uncertainty: Some(fitted.stored_uncertainty()),
-            corrections: Vec::new(),
-            mountings: table_file::stored_mountings(&fitted.solution.problem),
-            earlier_load: None,
-        };
+        let mut table = fitted.table_file(format!("host {} studio", env!("CARGO_PKG_VERSION")));
+        table.about.date = date::now_utc();
+        table.about.sources = table_file::sources(&campaign, &files, hashes);
         let path = self.free("fitted", "pam");
-        TableFile { table: fitted.table.clone(), about }.write(&path)?;
+        table.write(&path)?;
         let lines = lines(&campaign, &fitted.table)?;
         let html = fit_page::page(&fitted, &campaign, &options).html();
         let name = report_name()?;
@@ -293,17 +283,15 @@ impl Analysis {
         known.table = Some(path.clone());
         let report = Self::keep_report(&mut known, name, html);
         drop(known);
-        Ok(json!({
-            "summary": fitted.summary, "text": fitted.summary.to_string(), "lines": lines,
-            "table": path.display().to_string(), "report": report,
-        }))
+        let text = fitted.summary.to_string();
+        Ok(Fitted { summary: fitted.summary, text, lines, table: path.display().to_string(), report })
     }
 
     /// What the model leaves out of all recordings.
     ///
     /// # Errors
     /// As [`pam_diagnose::diagnose`].
-    pub fn diagnose(&self, muscle: &str) -> Result<Value> {
+    pub fn diagnose(&self, muscle: &str) -> Result<Diagnosed> {
         let (muscle, campaign, ..) = self.read(muscle)?;
         let geometry = muscle.geometry();
         let answer = pam_diagnose::diagnose(
@@ -313,7 +301,7 @@ impl Analysis {
         )?;
         let html = diagnose_page::page(&answer, &geometry, &campaign).html();
         let report = Self::keep_report(&mut self.known(), report_name()?, html);
-        Ok(json!({ "text": pam_report::wording::summary(&answer), "report": report }))
+        Ok(Diagnosed { text: pam_report::wording::summary(&answer), report })
     }
 }
 
@@ -326,7 +314,7 @@ fn name_of(path: &Path) -> String {
 }
 
 /// Measured and fitted load lines: contraction in percent, force in N.
-fn lines(campaign: &Campaign, table: &model_core::table::MuscleTable) -> Result<Vec<Value>> {
+fn lines(campaign: &Campaign, table: &model_core::table::MuscleTable) -> Result<Vec<LoadLine>> {
     let muscle =
         Muscle::<f64>::build(table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
     let l0 = f64::from(table.geometry.rest_length.metres());
@@ -350,12 +338,13 @@ fn lines(campaign: &Campaign, table: &model_core::table::MuscleTable) -> Result<
                 );
             }
         }
-        out.push(json!({
-            "kPa": pressure / 1e3,
-            "x": recording.stroke.iter().step_by(every).map(|x| 100.0 * x / l0).collect::<Vec<_>>(),
-            "F": force.iter().step_by(every).collect::<Vec<_>>(),
-            "mx": model.0, "mF": model.1,
-        }));
+        out.push(LoadLine {
+            kPa: pressure / 1e3,
+            x: recording.stroke.iter().step_by(every).map(|x| 100.0 * x / l0).collect(),
+            F: force.iter().step_by(every).copied().collect(),
+            mx: model.0,
+            mF: model.1,
+        });
     }
     Ok(out)
 }
@@ -384,7 +373,7 @@ mod tests {
         analysis.upload("../../etc/x.csv", pieces(text.as_bytes())).unwrap();
         let names: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(names, ["1-_.._etc_x.csv"]);
-        assert_eq!(analysis.curves(0).unwrap()["rows"], 20);
+        assert_eq!(analysis.curves(0).unwrap().rows, 20);
         assert!(analysis.curves(1).is_err());
         assert!(analysis.fit("name = 1").is_err());
     }
@@ -393,21 +382,21 @@ mod tests {
     fn the_table_and_the_report_of_one_fit_belong_together() {
         let folder = tempfile::tempdir().unwrap();
         let analysis = Analysis::new(folder.path().to_owned()).unwrap();
-        let muscle = analysis.example("mini").unwrap()["muscle"].as_str().unwrap().to_owned();
+        let muscle = analysis.example("mini").unwrap().muscle.unwrap();
         let (one, other) = std::thread::scope(|scope| {
             let one = scope.spawn(|| analysis.fit(&muscle).unwrap());
             let other = scope.spawn(|| analysis.fit(&muscle).unwrap());
             (one.join().unwrap(), other.join().unwrap())
         });
-        assert_ne!(one["table"], other["table"]);
-        assert_ne!(one["report"], other["report"]);
+        assert_ne!(one.table, other.table);
+        assert_ne!(one.report, other.report);
         let last = analysis.table().unwrap();
         for fit in [&one, &other] {
-            let table = fit["table"].as_str().unwrap();
-            assert!(TableFile::read(table).is_ok());
+            let table = fit.table.as_str();
+            assert!(table_file::TableFile::read(table).is_ok());
             // Only what was fitted last can be sent, and only under its own name.
             assert_eq!(analysis.table_named(table).is_ok(), last.as_os_str() == table);
-            let name = fit["report"].as_str().unwrap().strip_prefix("/report/").unwrap();
+            let name = fit.report.strip_prefix("/report/").unwrap();
             assert_eq!(name.len(), 32);
             assert!(analysis.report(name).unwrap().contains("<html"));
         }

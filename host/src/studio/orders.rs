@@ -1,13 +1,12 @@
 //! Orders of the page: to the controller, and about recordings.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use serde_json::{Value, json};
 use tokio::sync::oneshot;
 
 use super::analysis::Analysis;
+use super::answers::{Answer, Emulated, Ended, VentPath};
 use super::server::{Shared, ended_in_fault};
 use super::session::{Connected, Order, Request};
 use pam_data::error::{DataCode, Error, Result};
@@ -54,12 +53,12 @@ pub(super) enum Compared {
 }
 
 impl Shared {
-    pub(super) async fn order(&self, order: Order) -> Result<Value> {
+    pub(super) async fn order(&self, order: Order) -> Result<Answer> {
         self.order_since(order, self.vent.count()).await
     }
 
     /// An order, with the number of vents before it was sent.
-    pub(super) async fn order_since(&self, order: Order, vents: u64) -> Result<Value> {
+    pub(super) async fn order_since(&self, order: Order, vents: u64) -> Result<Answer> {
         let gone = || {
             Error::new(DeviceCode::DeviceSilent, "the thread of the controller has ended")
                 .help("start `host studio` again")
@@ -82,35 +81,36 @@ impl Shared {
     /// A computation that uses the whole machine, after those that were ordered before.
     pub(super) async fn compute(
         &self,
-        work: impl FnOnce(&Analysis) -> Result<Value> + Send + 'static,
-    ) -> Result<Value> {
+        work: impl FnOnce(&Analysis) -> Result<Answer> + Send + 'static,
+    ) -> Result<Answer> {
         let _turn = self.computing.acquire().await;
         self.apart(work).await
     }
 
     /// The new connection is opened and checked before the present one is given up.
-    pub(super) async fn connect(&self, port: String) -> Result<Value> {
+    pub(super) async fn connect(&self, port: String) -> Result<Answer> {
         let address: Address = port.parse()?;
-        if self.order(Order::IsConnected(address.clone())).await? == json!(true) {
-            return Ok(Value::Null);
+        if let Answer::Truth(true) = self.order(Order::IsConnected(address.clone())).await? {
+            return Ok(Answer::Done);
         }
         let fresh = self.apart(|_| Connected::open(address)).await?;
         self.order(Order::Replace(Box::new(fresh))).await
     }
 
-    pub(super) async fn emulate(&self, muscle: String) -> Result<Value> {
+    pub(super) async fn emulate(&self, muscle: String) -> Result<Answer> {
         let (fresh, words) = self.apart(move |_| Connected::emulate(&muscle)).await?;
         self.order(Order::Replace(Box::new(fresh))).await?;
-        Ok(json!({ "controller": words }))
+        Ok(Answer::Emulated(Emulated { controller: words }))
     }
 
     /// Carries out what the page posted.
-    pub(super) async fn post(&self, posted: Posted) -> Result<Value> {
+    pub(super) async fn post(&self, posted: Posted) -> Result<Answer> {
         match posted {
-            Posted::Ports => self.apart(|_| Ok(json!(available()))).await,
-            Posted::VentPath => Ok(
-                json!({ "address": format!("{}/vent", self.vent_path.origin), "token": &*self.vent_path.token }),
-            ),
+            Posted::Ports => self.apart(|_| Ok(Answer::Ports(available()))).await,
+            Posted::VentPath => Ok(Answer::VentPath(VentPath {
+                address: format!("{}/vent", self.vent_path.origin),
+                token: self.vent_path.token.to_string(),
+            })),
             Posted::Connect { port } => self.connect(port).await,
             Posted::Emulate { muscle } => self.emulate(muscle).await,
             Posted::Disconnect => self.order(Order::Disconnect).await,
@@ -118,7 +118,7 @@ impl Shared {
             // The page uses the path of its own; this one serves where that cannot be reached, as through a tunnel.
             Posted::Vent => {
                 let vent = Arc::clone(&self.vent);
-                self.apart(move |_| vent.now().map(|()| Value::Null)).await
+                self.apart(move |_| vent.now().map(|()| Answer::Done)).await
             }
             Posted::Follow { quantity, profile } => self.follow(&quantity, profile).await,
             Posted::Faults => self.order(Order::Faults).await,
@@ -130,28 +130,31 @@ impl Shared {
                 self.order(Order::Record(path)).await
             }
             Posted::EndRecord => {
-                let ended = self.order(Order::EndRecord).await?;
-                if let Some(path) = ended["path"].as_str() {
-                    self.analysis.add(PathBuf::from(path));
+                if let Answer::Ended(Ended { path: Some(path) }) = self.order(Order::EndRecord).await? {
+                    self.analysis.add(path);
                 }
-                Ok(self.analysis.list())
+                Ok(Answer::Recordings(self.analysis.list()))
             }
             Posted::Watch { reference: Compared::Nothing } => self.order(Order::Watch(None)).await,
             Posted::Watch { reference } => {
                 let read = self.apart(move |a| a.reference(reference == Compared::Table)).await?;
                 self.order(Order::Watch(Some(Arc::new(read)))).await
             }
-            Posted::Recordings => Ok(self.analysis.list()),
-            Posted::Curves { number } => self.apart(move |a| a.curves(number)).await,
-            Posted::Compare { a, b } => self.apart(move |w| w.compare(a, b)).await,
-            Posted::Example { muscle } => self.compute(move |a| a.example(&muscle)).await,
-            Posted::Fit { muscle } => self.compute(move |a| a.fit(&muscle)).await,
-            Posted::Diagnose { muscle } => self.compute(move |a| a.diagnose(&muscle)).await,
+            Posted::Recordings => Ok(Answer::Recordings(self.analysis.list())),
+            Posted::Curves { number } => self.apart(move |a| a.curves(number).map(Answer::Curves)).await,
+            Posted::Compare { a, b } => self.apart(move |w| w.compare(a, b).map(Answer::Compared)).await,
+            Posted::Example { muscle } => {
+                self.compute(move |a| a.example(&muscle).map(Answer::Recordings)).await
+            }
+            Posted::Fit { muscle } => {
+                self.compute(move |a| a.fit(&muscle).map(|f| Answer::Fitted(Box::new(f)))).await
+            }
+            Posted::Diagnose { muscle } => {
+                self.compute(move |a| a.diagnose(&muscle).map(Answer::Diagnosed)).await
+            }
             Posted::Difference => {
                 let table = self.analysis.table()?;
-                let mut found = self.order(Order::Difference(table.clone())).await?;
-                found["table"] = json!(table.display().to_string());
-                Ok(found)
+                self.order(Order::Difference(table)).await
             }
             Posted::Flash { table } => {
                 let table = self.analysis.table_named(&table)?;
@@ -160,7 +163,7 @@ impl Shared {
         }
     }
 
-    async fn follow(&self, quantity: &str, profile: String) -> Result<Value> {
+    async fn follow(&self, quantity: &str, profile: String) -> Result<Answer> {
         let quantity = match quantity {
             "force" => Quantity::Force,
             "pressure" => Quantity::Pressure,

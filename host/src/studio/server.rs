@@ -20,14 +20,15 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use serde::Deserialize;
-use serde_json::{Value, json};
 use tokio::sync::{Semaphore, broadcast};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::BroadcastStream;
 
 use super::access::{Access, guard, has_token, same, token};
 use super::analysis::Analysis;
+use super::answers::{Answer, Failure};
 use super::connections::{Limits, body, serve as serve_connections};
+use super::events::Message;
 use super::orders::Posted;
 use super::session;
 use super::vent::{self, Vent, VentPath};
@@ -124,7 +125,7 @@ pub fn serve(
         match first {
             Some(First::Connect(port)) => shared.connect(port).await?,
             Some(First::Emulate(muscle)) => shared.emulate(muscle).await?,
-            None => Value::Null,
+            None => Answer::Done,
         };
         ready(&format!("http://127.0.0.1:{port}/?token={token}"));
         let app = router(shared, hosts);
@@ -215,7 +216,10 @@ async fn stream(State(shared): State<Shared>, headers: HeaderMap) -> Response {
     let lines = BroadcastStream::new(shared.say.subscribe()).map(|message| {
         Ok::<_, Infallible>(match message {
             Ok(text) => text + "\n",
-            Err(_) => json!({ "k": "e", "level": "bad", "text": "this page is too slow: some telemetry was not shown" }).to_string() + "\n",
+            Err(_) => {
+                let text = "this page is too slow: some telemetry was not shown";
+                Message::Error { level: "bad", text, help: None }.line() + "\n"
+            }
         })
     });
     ([(header::CONTENT_TYPE, "application/x-ndjson")], Body::from_stream(lines)).into_response()
@@ -223,12 +227,12 @@ async fn stream(State(shared): State<Shared>, headers: HeaderMap) -> Response {
 
 pub(super) fn failed(error: &Error) -> Response {
     let place = error.place().to_string();
-    let value =
-        json!({ "error": error.cause(), "at": place, "help": error.advice(), "code": error.code().name() });
-    (StatusCode::BAD_REQUEST, Json(value)).into_response()
+    let failure =
+        Failure { error: error.cause(), at: place, help: error.advice(), code: error.code().name() };
+    (StatusCode::BAD_REQUEST, Json(failure)).into_response()
 }
 
-fn answered(outcome: Result<Value>) -> Response {
+fn answered(outcome: Result<Answer>) -> Response {
     match outcome {
         Ok(value) => Json(value).into_response(),
         Err(error) => failed(&error),
@@ -283,7 +287,8 @@ async fn upload(State(shared): State<Shared>, Query(named): Query<Named>, reques
         }
     }
     drop(send);
-    answered(stored.await.unwrap_or_else(|e| Err(ended_in_fault(&e))))
+    let stored = stored.await.unwrap_or_else(|e| Err(ended_in_fault(&e)));
+    answered(stored.map(Answer::Recordings))
 }
 
 pub(super) fn ended_in_fault(reason: &tokio::task::JoinError) -> Error {

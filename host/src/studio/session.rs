@@ -11,11 +11,11 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use model_core::link::messages::State;
-use serde_json::{Value, json};
 use tokio::sync::{broadcast, oneshot};
 
 pub use self::connected::Connected;
-use super::events::tell;
+use super::answers::Answer;
+use super::events::{Message, tell};
 use super::vent::Vent;
 use crate::change_watch::Reference;
 use pam_data::error::{DataCode, Error, Result};
@@ -70,7 +70,7 @@ pub struct Request {
     /// [`Vent::count`] at that time.
     pub vents: u64,
     /// Where the answer goes.
-    pub answer: oneshot::Sender<Result<Value>>,
+    pub answer: oneshot::Sender<Result<Answer>>,
 }
 
 /// How long an armed controller may go without any page that shows it.
@@ -116,7 +116,7 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    fn obey(&mut self, order: Order, vents: u64) -> Result<Value> {
+    fn obey(&mut self, order: Order, vents: u64) -> Result<Answer> {
         if order.moves() && vents != self.vent.count() {
             return Err(Error::new(
                 DataCode::CallInvalid,
@@ -127,18 +127,19 @@ impl Session<'_> {
         match order {
             Order::Replace(fresh) => self.replace(*fresh),
             Order::IsConnected(address) => {
-                Ok(json!(self.connected.as_ref().is_some_and(|c| c.address().same_place(&address))))
+                let present = self.connected.as_ref();
+                Ok(Answer::Truth(present.is_some_and(|c| c.address().same_place(&address))))
             }
             Order::Disconnect => {
                 let vented = self.close();
-                vented.map(|()| Value::Null)
+                vented.map(|()| Answer::Done)
             }
             other => self.connected.as_mut().ok_or_else(no_controller)?.obey(other),
         }
     }
 
     /// What the page has started on the present controller is vented and its recording ended before its connection is given up.
-    fn replace(&mut self, fresh: Connected) -> Result<Value> {
+    fn replace(&mut self, fresh: Connected) -> Result<Answer> {
         if let Some(present) = &mut self.connected {
             present.release().map_err(|e| {
                 Error::new(e.code(), format!("the present controller stays connected: {}", e.cause()))
@@ -148,7 +149,7 @@ impl Session<'_> {
         self.close()?;
         self.vent.connect(fresh.vent_line()?);
         self.connected = Some(fresh);
-        Ok(Value::Null)
+        Ok(Answer::Done)
     }
 
     /// Vents over the conversation, too, what was vented beside it: an order that was under way may have come after that.
@@ -202,12 +203,10 @@ impl Session<'_> {
 }
 
 fn report(connected: Option<&mut Connected>, say: &broadcast::Sender<String>) {
-    let text = match connected {
-        Some(present) => present.report().to_string(),
-        None => json!({ "k": "s", "connected": false }).to_string(),
-    };
+    let controller = connected.map(Connected::report);
+    let message = Message::State { connected: controller.is_some(), controller };
     // Without a page nothing receives it.
-    let _ = say.send(text);
+    let _ = say.send(message.line());
 }
 
 fn no_controller() -> Error {

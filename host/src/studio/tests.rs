@@ -11,12 +11,13 @@ use model_core::link::endpoints::{Disarm, Endpoint};
 use model_core::link::frame::Accumulator;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::{Address, Client, Patience, Port};
-use serde_json::{Value, json};
+use serde_json::Value;
 use tokio::sync::{Semaphore, broadcast, oneshot};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::Motion;
 
 use super::analysis::Analysis;
+use super::answers::Answer;
 use super::orders::{Compared, Posted};
 use super::server::Shared;
 use super::session::{self, Connected, Order};
@@ -185,7 +186,7 @@ fn a_vent_passes_a_computation_that_is_under_way() {
                 let held = move |_: &Analysis| {
                     begun.send(()).unwrap();
                     gate.pass();
-                    Ok(json!("computed"))
+                    Ok(Answer::Truth(true))
                 };
                 shared.compute(held).await
             })
@@ -207,7 +208,7 @@ fn a_vent_passes_a_computation_that_is_under_way() {
         studio.state(|s| s["state"] == "disarmed").await;
         assert!(!computation.is_finished() && !second.is_finished());
         gate.set(false);
-        assert_eq!(computation.await.unwrap().unwrap(), "computed");
+        assert!(matches!(computation.await.unwrap().unwrap(), Answer::Truth(true)));
         assert!(second.await.unwrap().is_err());
     });
 }

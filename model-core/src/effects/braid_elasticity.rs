@@ -12,7 +12,8 @@
 //! this is the derivative of the elastic energy `−T² B c/2` of the fibres; it does not hold for soft braids that lose tens of per cent.
 
 use super::{
-    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter,
+    Start, Traits,
 };
 use crate::scalar::Scalar;
 
@@ -39,7 +40,8 @@ impl Effect for BraidElasticity {
 
     const TRAITS: Traits = Traits::shown_by(Experiment::EndsAndDiameter)
         .check(BenchCheck::EndsAndDiameter)
-        .imitates(Imitates::Description);
+        .imitates(Imitates::Description)
+        .changed(Changed::new(Class::Gain, Owner::Muscle, "the braid's fibres stretch"));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let b = context.fibre_length;

@@ -10,7 +10,9 @@
 //! `κ_h` is for friction that changes during the rest itself: positive where contacts grip harder, negative where they creep and let the
 //! force go to the middle of the loop.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits, decay,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -37,7 +39,10 @@ impl Effect for BreakawayFriction {
         source: "J. H. Dieterich, J. Geophys. Res. 84 (1979) 2161–2168, doi 10.1029/JB084iB05p02161",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Rests);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Rests).changed(
+        Changed::new(Class::Alone(Self::INFO.name), Owner::Muscle, "friction is higher after a rest")
+            .remembering(),
+    );
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [where it rested, for how long, last hold time, whether it moves, seen]

@@ -8,7 +8,9 @@
 //! less if part of the bladder touches early. In the second, for pressures that are all above contact, the deadband grows by `p_1 ε_x`,
 //! Pa, without a kink. `g`, m², is the muscle's effective area; past the neutral angle (`g < 0`) the sign turns with the base model's.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -33,7 +35,11 @@ impl Effect for ContactLoss {
         source: "deadband that depends on length, after S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps);
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps).changed(Changed::new(
+        Class::Alone(Self::INFO.name),
+        Owner::Muscle,
+        "the bladder does not touch the braid yet",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let needed = (parameters[2] * context.radial_strain).max(T::ZERO);

@@ -9,7 +9,8 @@
 //! muscle first moves `s` is unknown and nothing is added.
 
 use super::{
-    Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented, stroke_direction,
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits, Vented,
+    stroke_direction,
 };
 use crate::scalar::Scalar;
 
@@ -34,7 +35,9 @@ impl Effect for CoulombFriction {
         source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).vented(Vented::FirstLaw);
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps)
+        .vented(Vented::FirstLaw)
+        .changed(Changed::new(Class::Friction, Owner::RigOrMuscle, "ΔF = −f·sgn v").sized("force", "N"));
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke

@@ -8,7 +8,7 @@
 //! path has grown by a thousandth.
 
 use super::{
-    Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay,
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits, decay,
     work::{PATH, WORK_SLOTS, work},
 };
 use crate::scalar::Scalar;
@@ -39,7 +39,9 @@ impl Effect for CyclicSoftening {
         source: "B. Woods, M. Gentry, C. Kothera, N. Wereley, J. Intelligent Material Systems and Structures 23 (2012) 327–343: fatigue of swaged muscles",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::RepeatsAfterRest).slow();
+    const TRAITS: Traits = Traits::shown_by(Experiment::RepeatsAfterRest).slow().changed(
+        Changed::new(Class::Softening, Owner::Muscle, "the bladder softens with cycles").remembering(),
+    );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         work(context, memory);

@@ -6,7 +6,10 @@
 //! `x` is the contraction stroke, `δ`, m, positive when slipping gave length; `t_s`, s, on the clock of the campaign. A slip at or before
 //! time zero is there from the first reading; once seen it stays (the memory is kept over a power cycle). First order in `δ`.
 
-use super::{Axis, BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Axis, BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter,
+    Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -30,7 +33,11 @@ impl Effect for EndSlip {
         source: "a step of the rest length at a change point; sensitivity of the base model",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength);
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength).changed(
+            Changed::new(Class::EndSlip, Owner::RigOrMuscle, "ΔF = δ·∂F/∂x from one moment on")
+                .sized("slip", "m"),
+        );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         if context.time >= parameters[1] {

@@ -4,7 +4,9 @@
 //! direction is known. In a recording of full loops it cannot be reported from a gain of the load cell or the gauge; a dwell
 //! approached from both sides can tell.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -25,7 +27,11 @@ impl Effect for FrictionAsymmetry {
         source: "M. Capace et al., Actuators 8(2) (2019) 49, doi 10.3390/act8020049; D. B. Reynolds et al. 2003, doi 10.1114/1.1554921",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::RestsFromBothSides);
+    const TRAITS: Traits = Traits::shown_by(Experiment::RestsFromBothSides).changed(Changed::new(
+        Class::Gain,
+        Owner::Muscle,
+        "friction differs between the directions",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let known = context.direction * context.direction;

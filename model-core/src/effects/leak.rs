@@ -4,7 +4,10 @@
 //! laminar line at a regulated pressure; a closed muscle that leaks shows it in the measured pressure itself, and nothing is
 //! missing. From force alone it cannot be reported from a wrong gain of the gauge: close the valve for a minute and watch.
 
-use super::{BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -25,7 +28,9 @@ impl Effect for Leak {
         source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge).check(BenchCheck::ReferenceGauge);
+    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge)
+        .check(BenchCheck::ReferenceGauge)
+        .changed(Changed::new(Class::Gain, Owner::RigOrMuscle, "air lost on the way costs pressure"));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -context.pull_per_pressure() * parameters[0] * context.pressure

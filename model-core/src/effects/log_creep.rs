@@ -20,7 +20,9 @@
 //! delay. For the drive by the pull, the memory begins at zero: the muscle hung unloaded before the first row. For the drives of the
 //! bladder the memory begins settled, and stresses from before the recording fade.
 
-use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// Branches, one per decade.
@@ -66,7 +68,10 @@ impl Effect for LogCreep {
         source: "S. M. Clarke, F. Elias, E. M. Terentjev, European Physical Journal E 2 (2000) 335–341, doi 10.1007/s101890050015; W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::LongHolds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::LongHolds).changed(
+        Changed::new(Class::Relaxation, Owner::Muscle, "force creeps with the logarithm of time")
+            .remembering(),
+    );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let times = times(parameters[3]);

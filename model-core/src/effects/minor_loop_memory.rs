@@ -11,7 +11,10 @@
 //! extremum is wiped out once the muscle goes beyond it. On loops wider than `2r` it is a dry friction. Before the first full travel
 //! the state is unknown; it begins in the middle.
 
-use super::{Axis, BraidTravel, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Axis, BraidTravel, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter,
+    Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -36,7 +39,10 @@ impl Effect for MinorLoopMemory {
         source: "Y. Liu et al., Strojniški vestnik 63 (2017) 56–64, doi 10.5545/sv-jme.2016.4027 (Prandtl–Ishlinskii operators for a pneumatic muscle); P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops);
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops).changed(
+        Changed::new(Class::TurningMemory, Owner::Muscle, "small loops remember at the reversal")
+            .remembering(),
+    );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [(ξ − y_i)/r, i = 1…6; last stroke, last pressure, seen]

@@ -10,7 +10,9 @@
 //! this law nothing.
 //! The error function is Abramowitz and Stegun's 7.1.27, within 5·10⁻⁴.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -35,7 +37,10 @@ impl Effect for MullinsSoftening {
         source: "R. W. Ogden and D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861–2877, doi 10.1098/rspa.1999.0431",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::FirstStrokes);
+    const TRAITS: Traits = Traits::shown_by(Experiment::FirstStrokes).changed(
+        Changed::new(Class::Alone(Self::INFO.name), Owner::Muscle, "the first stretch softens the bladder")
+            .remembering(),
+    );
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [W_m]

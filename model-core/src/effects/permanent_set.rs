@@ -8,7 +8,8 @@
 //! muscle with a longer rest length is contracted further and pulls less. First order in `δ`.
 
 use super::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits, decay,
     work::{IMPULSE, PATH, work},
 };
 use crate::scalar::Scalar;
@@ -37,7 +38,15 @@ impl Effect for PermanentSet {
         source: "change of rest length in early life, 0.1 to 1 %; E. G. Hocking, thesis, University of Maryland (2012): run-in over the first tests",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength).slow();
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength).slow().changed(
+            Changed::new(
+                Class::Alone(Self::INFO.name),
+                Owner::Muscle,
+                "the muscle stays longer with every cycle",
+            )
+            .remembering(),
+        );
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         work(context, memory);

@@ -10,7 +10,10 @@
 //! it has the loops' own memory: return to a reversal closes its loop.
 //! Before the first full travel the elements' state is unknown; they begin in the middle.
 
-use super::{BraidTravel, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    BraidTravel, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -35,7 +38,10 @@ impl Effect for PreslidingHysteresis {
         source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops);
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops).changed(
+        Changed::new(Class::TurningMemory, Owner::Muscle, "friction builds up after a reversal")
+            .remembering(),
+    );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [z_1…z_4, last stroke, last pressure, seen]

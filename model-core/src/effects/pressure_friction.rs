@@ -6,7 +6,9 @@
 //! differs from the table's own where a contracted muscle is pressurised and pulls little. Below contact (`P < P0`) the law
 //! overstates friction.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -30,7 +32,10 @@ impl Effect for PressureFriction {
         source: "B. Tondu and P. Lopez, IEEE Control Systems Magazine 20(2) (2000) 15–38, doi 10.1109/37.833638; B. Tondu, J. Intelligent Material Systems and Structures 23 (2012) 225–253, doi 10.1177/1045389X11435435",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps);
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).changed(
+        Changed::new(Class::Friction, Owner::RigOrMuscle, "ΔF = −μ·P·sgn v")
+            .sized("force_per_pressure", "m²"),
+    );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let (now, at_rest) = (context.radius * context.radius, context.rest_radius * context.rest_radius);

@@ -10,7 +10,9 @@
 //! opening, both are one: the gas law `d(p V)/dt = −V_0 δP/T_c` of the absolute pressure `p` with the charging time `T_c`, s, that the muscle
 //! has at rest length (`V_0`). `LP_τ` is a first-order lag. First order in `δP`; a choked line is not linear.
 
-use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// `P_a`, Pa.
@@ -44,7 +46,11 @@ impl Effect for PressureLag {
         source: "simplified lumped model for pneumatic tubes, doi 10.1080/13873954.2017.1280512; E. Richer and Y. Hurmuzlu, J. Dynamic Systems, Measurement and Control 122 (2000) 416–425",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).changed(Changed::new(
+        Class::RateOrPhase,
+        Owner::RigOrMuscle,
+        "pressure at the muscle lags",
+    ));
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let drives = [context.area * context.speed, context.pressure_rate];

@@ -3,7 +3,9 @@
 //! `c` (dimensionless) is the share of the force lost at 1 mm/s, `m` the exponent: 0 would be the table's own friction, 1 a viscous
 //! one. Rubber and sheaths give small exponents. Holds over the decades of speed that were recorded; at rest the force is zero.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -27,7 +29,11 @@ impl Effect for RatePower {
         source: "M. Bennington et al. 2023, arXiv 2301.04684; M. A. Mat Dzahir and S. Yamamoto, Applied Sciences 9(12) (2019) 2538, doi 10.3390/app9122538",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).changed(Changed::new(
+        Class::SlowSpeed,
+        Owner::Muscle,
+        "friction by a power of speed",
+    ));
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [(|v|/v_1)^m], so that a search for pressure does not compute the power again.

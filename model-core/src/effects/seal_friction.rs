@@ -8,8 +8,8 @@
 //! 5 mm/s real seals stick and slip, which a mean force describes only on average.
 
 use super::{
-    Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented, decay,
-    stroke_direction,
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits, Vented,
+    decay, stroke_direction,
 };
 use crate::scalar::Scalar;
 
@@ -36,7 +36,9 @@ impl Effect for SealFriction {
         source: "B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083–1138, doi 10.1016/0005-1098(94)90209-7",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).vented(Vented::Everything);
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps)
+        .vented(Vented::Everything)
+        .changed(Changed::new(Class::Friction, Owner::Muscle, "a rod's seal rubs"));
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke

@@ -3,7 +3,9 @@
 //! `ε = ΔL/L0`; `ε_j` where the strands begin to touch; `k_j`, N, how hard the wall is. One-sided. The true wall is steeper the further one
 //! goes; beyond a few per cent past `ε_j` the square is too soft.
 
-use super::{Axis, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Axis, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -27,7 +29,11 @@ impl Effect for StrandJamming {
         source: "S. Davis and D. Caldwell, Int. J. Robotics Research 25 (2006) 359–369, doi 10.1177/0278364906063227",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::EndOfStroke);
+    const TRAITS: Traits = Traits::shown_by(Experiment::EndOfStroke).changed(Changed::new(
+        Class::Alone(Self::INFO.name),
+        Owner::Muscle,
+        "strands lock at the stroke's end",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let over = (context.contraction - parameters[1]).max(T::ZERO);

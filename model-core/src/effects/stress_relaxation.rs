@@ -14,7 +14,9 @@
 //! `q` is the over-stress of a drive. For a spectrum over decades see `log-creep`. The memory begins settled: at rest for long in the
 //! state of the first reading; an over-stress left from before fades as `e^(−t/τ)`.
 
-use super::{Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 type Solid = Fading<1, 3>;
@@ -43,7 +45,9 @@ impl Effect for StressRelaxation {
         source: "W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::LongHolds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::LongHolds).changed(
+        Changed::new(Class::Relaxation, Owner::Muscle, "part of the bladder's stress relaxes").remembering(),
+    );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let (elastic, gaylord) = context.loads();

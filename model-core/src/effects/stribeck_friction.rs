@@ -4,7 +4,9 @@
 //! speed, `v_s`, m/s, the speed of the fall. Tondu and Lopez give the braid's friction this form. At one speed it cannot be reported
 //! from dry friction; four speeds over two decades are needed, the slowest below 0.3 mm/s.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits, decay,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -29,7 +31,11 @@ impl Effect for StribeckFriction {
         source: "B. Tondu and P. Lopez, IEEE Control Systems Magazine 20(2) (2000) 15–38, doi 10.1109/37.833638; Armstrong-Hélouvry et al. 1994, doi 10.1016/0005-1098(94)90209-7",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).changed(Changed::new(
+        Class::SlowSpeed,
+        Owner::Muscle,
+        "friction falls with speed",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let slow = decay(context.speed / parameters[2].max(T::from_f32(1.0e-6)));

@@ -9,7 +9,9 @@
 //! minutes). `a` softens the bladder's part of the pull, `F_b` ([`Context::bladder`]), and `b` the friction, per watt or per kelvin. Entropic rubber stiffens by 0.34 %/K
 //! (`a_T = −0.0034`); filled rubber near its transition softens. Recovers at rest with the same `τ`, unlike wear.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -36,7 +38,9 @@ impl Effect for ThermalSoftening {
         source: "M. Doumit and S. Pardoel, Mechanical Systems and Signal Processing 91 (2017) 93–110; L. R. G. Treloar, The Physics of Rubber Elasticity, 1975",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::RepeatsAfterRest).slow();
+    const TRAITS: Traits = Traits::shown_by(Experiment::RepeatsAfterRest).slow().changed(
+        Changed::new(Class::Softening, Owner::Muscle, "the bladder softens as it warms").remembering(),
+    );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [w, pending time, pending work, last stroke, seen, first temperature, step that the share holds for, share]

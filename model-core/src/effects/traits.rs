@@ -1,5 +1,7 @@
 //! What a diagnosis has to know of an effect beside its equations. A controller never asks for it, so its image carries none of it.
 
+use super::change::Changed;
+
 /// The experiment that shows an effect where recordings conceal it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Experiment {
@@ -98,6 +100,8 @@ pub struct Traits {
     /// Whether it is looked for in the differences between recordings of one mounting only, where no static model hides it, and not in the
     /// search through the rows.
     pub between_recordings: bool,
+    /// How a change of it shows between two campaigns; `None` for what no comparison looks for.
+    pub changed: Option<Changed>,
     /// Whether amplitudes and shapes that were fitted freely can belong to one and the same cause.
     pub consistent: fn(amplitudes: &[f64], shapes: &[f64]) -> bool,
 }
@@ -116,6 +120,7 @@ impl Traits {
             slow: false,
             imitates: None,
             between_recordings: false,
+            changed: None,
             consistent: always,
         }
     }
@@ -143,6 +148,11 @@ impl Traits {
     #[must_use]
     pub const fn imitates(self, what: Imitates) -> Self {
         Self { imitates: Some(what), ..self }
+    }
+    /// The same that shows in this way between two campaigns.
+    #[must_use]
+    pub const fn changed(self, changed: Changed) -> Self {
+        Self { changed: Some(changed), ..self }
     }
     /// The same with a rule that its parameters have to keep.
     #[must_use]

@@ -5,7 +5,9 @@
 //! Holds at the speeds of one decade or two; rubber's own damping rises more slowly than speed (see `rate-power`). At rest it
 //! vanishes immediately, unlike a lag of pressure.
 
-use super::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use super::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use crate::scalar::Scalar;
 
 /// See the [module](self).
@@ -29,7 +31,11 @@ impl Effect for ViscousDamping {
         source: "D. B. Reynolds et al., Annals of Biomedical Engineering 31 (2003) 310–317, doi 10.1114/1.1554921",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).changed(Changed::new(
+        Class::RateOrPhase,
+        Owner::Muscle,
+        "friction proportional to speed",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -(parameters[0] + parameters[1] * context.pressure) * context.speed

@@ -1,21 +1,24 @@
 //! Making a trial: the campaign with its effects, its twin without, held-out recordings, and the sealed truth.
 
-use crate::inject::{Injection, Parameter, Scale};
+mod disturbance;
+mod residual;
+mod strength;
+
+use crate::inject::Parameter;
 use crate::residuals::Residuals;
-use crate::spec::{Operator, Size, Spec, Stratum};
-use nalgebra::{DMatrix, DVector};
+use crate::spec::{Operator, Spec, Stratum};
 use serde::{Deserialize, Serialize};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::checks::{self, Check};
-use virtual_bench::friction::BraidFriction;
 use virtual_bench::muscle::Muscle;
-use virtual_bench::pneumatics::Pneumatics;
 use virtual_bench::protocol::{Place, Protocol, Step};
-use virtual_bench::recording::{Recording, Row};
+use virtual_bench::recording::Recording;
 use virtual_bench::rng::Rng;
-use virtual_bench::sensors::Sensor;
-use virtual_bench::tube::Geometry;
+
+use self::disturbance::{disturb, mishandle, resample, thin};
+use self::residual::{Base, least_left, rms};
+use self::strength::{Sized, sized};
 
 /// One injected effect, as it is in the sealed truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -118,219 +121,6 @@ fn held_out_protocol(levels: &[f64], speed: f64) -> Protocol {
     Protocol { name: "held-out".into(), sample_hz: 10.0, step }
 }
 
-fn duration(protocol: &Protocol, bench: &BenchSpec) -> f64 {
-    let mut quiet = bench.clone();
-    quiet.muscle.physics = Default::default();
-    let mut b = Bench::new(&quiet);
-    // A protocol that was built for the muscle passes its own check.
-    let _ = b.run(protocol);
-    b.clock()
-}
-
-/// The bench with instruments and regulator that add nothing of their own, so that two runs differ by the effect alone.
-fn silent(bench: &BenchSpec) -> BenchSpec {
-    let mut b = bench.clone();
-    let keep = |s: Sensor| Sensor { white: 0.0, coloured: (0.0, 1.0), outliers: (0.0, 0.0), stuck: 0.0, ..s };
-    b.instruments.force = keep(b.instruments.force);
-    b.instruments.pressure = keep(b.instruments.pressure);
-    b.instruments.stroke = keep(b.instruments.stroke);
-    b.pneumatics = Pneumatics { ripple: (0.0, 1.0), wander: (0.0, 1.0), deadband: 0.0, ..b.pneumatics };
-    b
-}
-
-fn rows(bench: &BenchSpec, protocol: &Protocol) -> Vec<Vec<Row>> {
-    let run = Bench::new(bench).run(protocol).unwrap_or_default();
-    run.into_iter().map(|f| f.rows).collect()
-}
-
-/// What an effect does to the force at the same measured pressure and stroke, row by row.
-fn difference(with: &[Vec<Row>], without: &[Vec<Row>], g: &Geometry) -> Vec<f64> {
-    with.iter()
-        .flatten()
-        .zip(without.iter().flatten())
-        .map(|(a, b)| {
-            let area = g.pulling_area(g.rest_length - b.stroke);
-            (a.force - b.force) - area * (a.pressure - b.pressure)
-        })
-        .collect()
-}
-
-fn quantile(values: &[f64], q: f64) -> f64 {
-    let mut v: Vec<f64> = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).collect();
-    v.sort_by(f64::total_cmp);
-    v.get(((v.len() as f64 * q) as usize).min(v.len().saturating_sub(1))).copied().unwrap_or(0.0)
-}
-
-/// A base to refit: its scales, and whether it is flexible.
-#[derive(Debug, Clone, Copy)]
-struct Base<'a> {
-    stroke: f64,
-    force: f64,
-    geometry: Geometry,
-    friction: &'a BraidFriction,
-    flexible: bool,
-    /// Whether friction follows what the base changes in the core force.
-    rubs: bool,
-}
-
-/// Columns of the stiff base.
-const STIFF: usize = 13;
-
-impl Base<'_> {
-    fn columns(&self) -> usize {
-        if self.flexible { 6 } else { STIFF }
-    }
-
-    /// Columns at one row. The flexible base has its own set per file. The stiff one shares a larger set: whatever depends on
-    /// the stroke alone could be the bladder's energy, so that is given every freedom, in stroke and in radius; then the
-    /// deadband, and friction straight in the pressure.
-    fn row(&self, r: &Row, way: f64) -> Vec<f64> {
-        let (u, f) = (r.stroke / self.stroke, r.force / self.force);
-        let g = &self.geometry;
-        // What changes the core force changes the friction with it.
-        let rubbed = if self.rubs { 1.0 - way * self.friction.factor(r.pressure) } else { 1.0 };
-        let mut row =
-            vec![rubbed, rubbed * u, rubbed * u * u, rubbed * u.powi(3), rubbed * u.powi(4), way * f];
-        if !self.flexible {
-            let q = g.braid_radius(g.rest_length - r.stroke) / g.radius - 1.0;
-            row[0] *= g.pulling_area(g.rest_length - r.stroke) * 1e6;
-            row.extend([u.powi(6), q, q * q, q.powi(3), q.powi(4)].map(|c| rubbed * c));
-            row.extend([1, 2].map(|power| way * f * (r.pressure / 5e5).powi(power)));
-        }
-        row
-    }
-}
-
-/// The residual of a difference after a base is refitted, row by row and file by file; vented files are left out of the
-/// fit and have nothing left.
-fn left(difference: &[f64], files: &[Vec<Row>], base: Base<'_>) -> Vec<Vec<f64>> {
-    let (columns, flexible) = (base.columns(), base.flexible);
-    let way = |file: &[Row], i: usize| {
-        let (a, b) = (i.saturating_sub(1), (i + 1).min(file.len() - 1));
-        (file[b].stroke - file[a].stroke).signum()
-    };
-    let mut normal = DMatrix::<f64>::zeros(columns, columns);
-    let mut rhs = DVector::<f64>::zeros(columns);
-    let mut at = 0;
-    let mut starts = Vec::new();
-    let mut solutions: Vec<Option<DVector<f64>>> = Vec::new();
-    let solve = |a: &DMatrix<f64>, y: &DVector<f64>| a.clone().svd(true, true).solve(y, 1e-12).ok();
-    for file in files {
-        starts.push(at);
-        if flexible {
-            normal.fill(0.0);
-            rhs.fill(0.0);
-        }
-        let pressed = file.iter().map(|r| r.pressure).fold(0.0, f64::max) > 20e3;
-        if pressed {
-            for i in (0..file.len()).step_by((file.len() / 600).max(1)) {
-                let b = DVector::from_vec(base.row(&file[i], way(file, i)));
-                normal += &b * b.transpose();
-                rhs += b * difference[at + i];
-            }
-        }
-        solutions.push(if flexible && pressed { solve(&normal, &rhs) } else { None });
-        at += file.len();
-    }
-    let shared = if flexible { None } else { solve(&normal, &rhs) };
-    files
-        .iter()
-        .zip(starts)
-        .zip(&solutions)
-        .map(|((file, at), own)| {
-            let pressed = file.iter().map(|r| r.pressure).fold(0.0, f64::max) > 20e3;
-            let Some(x) = own.as_ref().or(shared.as_ref()).filter(|_| pressed) else {
-                return vec![0.0; file.len()];
-            };
-            (0..file.len())
-                .map(|i| {
-                    let b = DVector::from_vec(base.row(&file[i], way(file, i)));
-                    difference[at + i] - b.dot(x)
-                })
-                .collect()
-        })
-        .collect()
-}
-
-/// The lesser residual, when friction follows the base's changes and when it does not: an effect that either
-/// reading absorbs counts as absorbed.
-fn least_left(difference: &[f64], files: &[Vec<Row>], base: Base<'_>) -> Vec<Vec<f64>> {
-    let (a, b) = (left(difference, files, base), left(difference, files, Base { rubs: false, ..base }));
-    if rms(&a) < rms(&b) { a } else { b }
-}
-
-fn rms(rows: &[Vec<f64>]) -> f64 {
-    let n: usize = rows.iter().filter(|f| f.iter().any(|v| *v != 0.0)).map(Vec::len).sum();
-    (rows.iter().flatten().map(|v| v * v).sum::<f64>() / n.max(1) as f64).sqrt()
-}
-
-/// Lose some rows: uneven sampling.
-fn thin(files: &mut [Recording], part: f64, seed: u64) {
-    if part <= 0.0 {
-        return;
-    }
-    let mut r = Rng::stream(seed, "lost rows");
-    for f in files {
-        f.rows.retain(|_| !r.chance(part));
-    }
-}
-
-/// Make every file as loud as it likes, up to `most` (N) of white noise.
-fn disturb(files: &mut [Recording], most: f64, seed: u64) {
-    if most <= 0.0 {
-        return;
-    }
-    let mut r = Rng::stream(seed, "uneven noise");
-    for f in files {
-        let loud = most * r.unit();
-        f.rows.iter_mut().for_each(|row| row.force += loud * r.normal());
-    }
-}
-
-/// Put resampled real residuals of deviation `deviation` (N) on the force.
-fn resample(files: &mut [Recording], residuals: &Residuals, deviation: f64, seed: u64) {
-    let mut r = Rng::stream(seed, "real residuals");
-    for f in files {
-        let series = residuals.series(f.rows.len(), RATE, &mut r);
-        f.rows.iter_mut().zip(series).for_each(|(row, v)| row.force += deviation * v);
-    }
-}
-
-/// Samples per second of every protocol used here.
-const RATE: f64 = 10.0;
-
-/// What the person at the bench makes of the files.
-fn mishandle(files: &mut Vec<Recording>, o: &Operator, blocked: f64, seed: u64) {
-    let mut r = Rng::stream(seed, "operator");
-    let tare = |f: &Recording| f.name.contains("tare");
-    let lost = |r: &mut Rng, most: f64| if r.chance(0.34) { (r.range(0.0, most) * RATE) as usize } else { 0 };
-    for f in files.iter_mut().filter(|f| !tare(f)) {
-        let (first, last) = (lost(&mut r, o.late_s), lost(&mut r, o.early_s));
-        if f.rows.len() > 2 * (first + last) {
-            f.rows.drain(..first);
-            f.rows.truncate(f.rows.len() - last);
-        }
-        let away = o.tared_drift * blocked * r.range(-1.0, 1.0) / f.rows.len().max(1) as f64;
-        f.rows.iter_mut().enumerate().for_each(|(i, row)| row.force += away * i as f64);
-    }
-    let tares: Vec<usize> = (0..files.len()).filter(|&i| tare(&files[i])).collect();
-    if o.forgot_tare && tares.len() > 1 {
-        files.remove(tares[r.index(tares.len())]);
-    }
-    let long: Vec<usize> = (0..files.len()).filter(|&i| files[i].rows.len() > 600).collect();
-    if o.restarted && !long.is_empty() {
-        let at = long[r.index(long.len())];
-        let cut = (files[at].rows.len() as f64 * r.range(0.3, 0.7)) as usize;
-        let mut rows = files[at].rows.split_off(cut);
-        rows.drain(..40);
-        let name = format!("{}_again", files[at].name);
-        files.insert(at + 1, Recording { name, rows });
-    }
-    for row in files.iter_mut().flat_map(|f| &mut f.rows) {
-        row.time *= 1.0 + o.clock_skew;
-    }
-}
-
 /// The campaign of a trial, every position in mm.
 fn protocol_of(spec: &Spec, muscle: &Muscle, levels: &[f64]) -> Protocol {
     let mut order = levels.to_vec();
@@ -362,73 +152,6 @@ pub fn after(spec: &Spec, bench: &BenchSpec, residuals: &Residuals, next: &Proto
         resample(&mut files, residuals, coloured, spec.seed ^ 2);
     }
     files
-}
-
-/// What the search for the strength of the effects gives.
-struct Sized {
-    scale: Scale,
-    protocol: Protocol,
-    levels: Vec<f64>,
-    speed: f64,
-    /// Rows of the silent bench without the effects; empty where there are none.
-    without: Vec<Vec<Row>>,
-    /// The bench with its effects.
-    bench: BenchSpec,
-    /// Peak of each effect as a part of the blocked force, what it adds to each row, and its parameters.
-    effects: Vec<(f64, Vec<f64>, Vec<Parameter>)>,
-}
-
-/// Finds how strong the effects of a trial have to be.
-fn sized(spec: &Spec) -> Sized {
-    let muscle = Muscle::new(spec.bench.muscle.clone());
-    let levels = campaigns::levels(&muscle);
-    let speed = campaigns::slow(&muscle, &levels);
-    let protocol = protocol_of(spec, &muscle, &levels);
-    let seconds = duration(&protocol, &spec.bench);
-    let scale = Scale::new(&muscle, &levels, speed * 1e-3, seconds);
-    let geometry = spec.bench.muscle.geometry;
-    let quiet = silent(&spec.bench);
-    let without = if spec.effects.is_empty() { Vec::new() } else { rows(&quiet, &protocol) };
-    let size = |injection: &Injection, s: f64| {
-        let mut b = quiet.clone();
-        injection.apply(&mut b, &scale, s);
-        let with = rows(&b, &protocol);
-        let d = difference(&with, &without, &geometry);
-        // What shows for a few samples at each reversal only is measured by them.
-        let part = if injection.name == "inertia" { 0.9999 } else { 0.995 };
-        (quantile(&d, part) / scale.force, d)
-    };
-    let mut bench = spec.bench.clone();
-    let mut effects = Vec::new();
-    for (injection, wanted) in &spec.effects {
-        let mut s = match wanted {
-            Size::Peak(_) => injection.strongest().min(1.0) * 0.5,
-            Size::Strength(s) => *s,
-        };
-        let (mut is, mut d) = size(injection, s);
-        // Most effects are straight in their strength; those that are not get there by secants in the logarithm.
-        let mut power = 1.0;
-        for _ in 0..9 {
-            let Size::Peak(wanted) = wanted else { break };
-            if is <= 0.0 || (is / wanted - 1.0).abs() < 0.1 {
-                break;
-            }
-            let next =
-                (s * (wanted / is).powf(1.0 / power).clamp(0.05, 20.0)).clamp(1e-3, injection.strongest());
-            if (next / s - 1.0).abs() < 1e-3 {
-                break;
-            }
-            let before = (s, is);
-            (is, d) = size(injection, next);
-            s = next;
-            if is > 0.0 {
-                power = ((is / before.1).ln() / (s / before.0).ln()).clamp(0.7, 4.0);
-            }
-        }
-        let parameters = injection.apply(&mut bench, &scale, s);
-        effects.push((is, d, parameters));
-    }
-    Sized { scale, protocol, levels, speed, without, bench, effects }
 }
 
 /// A pair of campaigns of one muscle, of which the later one has the effects of a trial.

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use model_core::link::endpoints::{EVENT, LOG, TELEMETRY};
 use model_core::link::frame::Header;
 use model_core::link::messages::{Event, Telemetry};
+use serde::Serialize;
 
 /// Telemetry that no one fetches is kept up to this many samples: a minute at 1 kHz.
 const BACKLOG: usize = 60_000;
@@ -21,7 +22,7 @@ pub enum Topic {
 }
 
 /// What did not arrive.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Losses {
     /// Samples that are missing at the rate of the subscription, by the tick counter of the device. Without a
     /// subscription, those that the sequence numbers miss.
@@ -33,6 +34,7 @@ pub struct Losses {
     /// Frames whose check failed, and bytes between frames that were none.
     pub bad_frames: u64,
     /// Requests that were sent again.
+    #[serde(rename = "repeated_requests")]
     pub repeats: u64,
     /// Samples that arrived and were never fetched.
     pub unread: u64,

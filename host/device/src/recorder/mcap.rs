@@ -16,10 +16,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::write::NoSeek;
 use ::mcap::{Attachment, WriteOptions, Writer};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 
 use super::columns::{COLUMNS, Column, SECOND};
 use pam_data::mcap_records::MAGIC;
+use pam_data::output::json_of;
 
 /// The end of a file without an index: end of data (0x0F), footer (0x02), magic.
 pub(super) const END: [u8; 13 + 29 + 8] = {
@@ -91,10 +93,14 @@ impl Encoder {
             }
         }
         writer.write_metadata(&Metadata { name: "recording".into(), metadata })?;
-        let schema =
-            writer.add_schema("pam.Telemetry", "jsonschema", telemetry_schema().to_string().as_bytes())?;
+        let schema = writer.add_schema(
+            "pam.Telemetry",
+            "jsonschema",
+            json_of(&telemetry_schema()).to_string().as_bytes(),
+        )?;
         let telemetry = writer.add_channel(schema, "/telemetry", "json", &BTreeMap::new())?;
-        let schema = writer.add_schema("pam.Event", "jsonschema", event_schema().to_string().as_bytes())?;
+        let schema =
+            writer.add_schema("pam.Event", "jsonschema", json_of(&event_schema()).to_string().as_bytes())?;
         let events = writer.add_channel(schema, "/events", "json", &BTreeMap::new())?;
         Ok(Self { writer, finished, telemetry, events, begun_ns, sequence: 0 })
     }
@@ -112,9 +118,9 @@ impl Encoder {
         self.write(self.telemetry, since_start_us, message)
     }
 
-    /// Adds an event.
-    pub fn event(&mut self, since_start_us: u64, event: &Value) -> ::mcap::McapResult<()> {
-        self.write(self.events, since_start_us, &event.to_string())
+    /// Adds an event, as the text of a JSON object.
+    pub fn event(&mut self, since_start_us: u64, message: &str) -> ::mcap::McapResult<()> {
+        self.write(self.events, since_start_us, message)
     }
 
     /// Ends the chunk and takes all finished bytes.
@@ -142,29 +148,64 @@ impl Encoder {
     }
 }
 
-fn telemetry_schema() -> Value {
-    let property = |c: &Column| (c.name.to_owned(), json!({ "type": c.kind(), "description": c.about }));
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "pam.Telemetry",
-        "description": "One tick of a controller's loop; fields that begin with second_ are those of a board's second muscle",
-        "type": "object",
-        "properties": COLUMNS.iter().chain(SECOND).map(property).collect::<serde_json::Map<_, _>>(),
-        "required": COLUMNS.iter().map(|c| c.name).collect::<Vec<_>>(),
-    })
+/// The JSON Schema of a topic's messages.
+#[derive(Serialize)]
+struct Schema {
+    #[serde(rename = "$schema")]
+    dialect: &'static str,
+    title: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    description: Option<&'static str>,
+    r#type: &'static str,
+    properties: BTreeMap<&'static str, Property>,
+    required: Vec<&'static str>,
 }
 
-fn event_schema() -> Value {
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "pam.Event",
-        "type": "object",
-        "properties": {
-            "time_s": { "type": ["number", "null"], "description": "time of the device, s" },
-            "event": { "type": "string", "description": "state, fault or trace-full" },
-            "text": { "type": "string", "description": "description of the event" },
-            "remedy": { "type": "string", "description": "what to do about a fault" },
-        },
-        "required": ["event", "text"],
-    })
+/// One field of a message.
+#[derive(Serialize)]
+struct Property {
+    r#type: Type,
+    description: &'static str,
+}
+
+/// The type of a field.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Type {
+    Always(&'static str),
+    OrNull([&'static str; 2]),
+}
+
+const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
+
+fn telemetry_schema() -> Schema {
+    let property = |c: &Column| (c.name, Property { r#type: Type::Always(c.kind()), description: c.about });
+    Schema {
+        dialect: DIALECT,
+        title: "pam.Telemetry",
+        description: Some(
+            "One tick of a controller's loop; fields that begin with second_ are those of a board's second muscle",
+        ),
+        r#type: "object",
+        properties: COLUMNS.iter().chain(SECOND).map(property).collect(),
+        required: COLUMNS.iter().map(|c| c.name).collect(),
+    }
+}
+
+fn event_schema() -> Schema {
+    let text = |description| Property { r#type: Type::Always("string"), description };
+    let time = Property { r#type: Type::OrNull(["number", "null"]), description: "time of the device, s" };
+    Schema {
+        dialect: DIALECT,
+        title: "pam.Event",
+        description: None,
+        r#type: "object",
+        properties: BTreeMap::from([
+            ("time_s", time),
+            ("event", text("state, fault or trace-full")),
+            ("text", text("description of the event")),
+            ("remedy", text("what to do about a fault")),
+        ]),
+        required: vec!["event", "text"],
+    }
 }

@@ -8,8 +8,6 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-
 use super::part::in_use;
 use super::side_file;
 use pam_data::error::{DataCode, Error, Result};
@@ -54,17 +52,6 @@ impl Recovered {
             pluralise(self.tally.samples_lost, "sample"),
             original.display()
         ))
-    }
-
-    /// For a machine.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        let text = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
-        json!({
-            "recording": text(&self.recording), "original": text(&self.original),
-            "samples": self.tally.samples, "samples_lost": self.tally.samples_lost,
-            "bytes_lost": self.tally.bytes_lost, "gaps": self.tally.gaps,
-        })
     }
 }
 

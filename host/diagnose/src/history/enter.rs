@@ -19,7 +19,7 @@ const RELAXED_SHARE: &str = "relaxed_share";
 /// The same for `P_b`.
 const BALANCE_PRESSURE: &str = "balance_pressure";
 /// Names of the memory: one and the same to these recordings.
-const NAMES: [&str; 2] = ["log-creep", "stress-relaxation"];
+const NAMES: [&str; 2] = [EffectName::LogCreep.info().name, EffectName::StressRelaxation.info().name];
 
 /// Whether an entry was found by the history layer: its parameters are not those of the catalogue's effect of that name.
 #[must_use]

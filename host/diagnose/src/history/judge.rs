@@ -11,6 +11,7 @@ use super::findings::{self, Contrast, Visits};
 use super::law::Law;
 use super::shift_fit::knot_step;
 use super::unseen::{Sizes, Unseen};
+use model_core::effects::EffectName;
 use pam_data::recording::Campaign;
 use pam_fit::numerics::student::half_width_95;
 
@@ -174,7 +175,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             size: Estimate::new(e.shift, Some(half), "kPa", "run"),
             units: points.mountings[e.mounting].runs.len(),
             squares: 0.0,
-            cause: (e.lasts && e.sure).then(|| "end-slip".to_owned()),
+            cause: (e.lasts && e.sure).then(|| EffectName::EndSlip.info().name.to_owned()),
             mounting: Some(e.mounting + 1),
             run: Some(e.run),
             words: format!(
@@ -251,7 +252,7 @@ fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> 
         size: estimate(&deficit, "mounting"),
         units: deficit.units,
         squares: deficit.squares,
-        cause: (found && named).then(|| "log-creep".to_owned()),
+        cause: (found && named).then(|| EffectName::LogCreep.info().name.to_owned()),
         mounting: None,
         run: Some(1),
         words,
@@ -273,7 +274,7 @@ fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
         size: Estimate::new(share, Some(half), "", "run"),
         units: points.runs.len(),
         squares: 0.0,
-        cause: named.then(|| "log-creep".to_owned()),
+        cause: named.then(|| EffectName::LogCreep.info().name.to_owned()),
         mounting: None,
         run: None,
         words: format!(
@@ -304,8 +305,8 @@ fn gap(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option
     // What the memory leaves of the gap must exclude none before friction is its cause.
     let rests = left.as_ref().is_none_or(|l| l.half.is_some_and(|h| l.mean > h));
     let cause = match (found, rubs && rests, named) {
-        (true, true, _) => Some("pressure-friction".to_owned()),
-        (true, false, true) => Some("log-creep".to_owned()),
+        (true, true, _) => Some(EffectName::PressureFriction.info().name.to_owned()),
+        (true, false, true) => Some(EffectName::LogCreep.info().name.to_owned()),
         _ => None,
     };
     let after = left.map(|l| format!("; the memory leaves {}", plus_minus(&l))).unwrap_or_default();

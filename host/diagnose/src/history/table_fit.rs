@@ -9,6 +9,7 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::pluralise::pluralise;
 use pam_data::recording::{Campaign, Recording};
+use pam_fit::bench::BenchName;
 use pam_fit::effect_columns::effect_columns;
 use pam_fit::numerics::median;
 use pam_fit::table_file::{About, Correction, TableFile};
@@ -150,7 +151,9 @@ impl<'a> Prepared<'a> {
     fn zeroed(&self, mut file: TableFile) -> TableFile {
         if self.zero != 0.0 {
             let parameters = vec![self.zero];
-            file.about.corrections.push(Correction { effect: "force-offset".into(), parameters });
+            file.about
+                .corrections
+                .push(Correction { effect: BenchName::ForceOffset.info().name.into(), parameters });
         }
         file
     }

@@ -136,71 +136,86 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
         (Err(_), Some(_)) if matches!(against, Against::Recordings(_)) => Protocol::Combined,
         (kind, _) => kind?,
     };
-    let mut report = match (against, kind) {
-        (Against::Recordings(before), _) => {
-            for r in &before.recordings {
-                r.require_force()?;
-            }
-            sides::apart(before, given)?;
-            let whole = before;
-            let before = &stages::parted(whole);
-            let mut remarks = units::check(before, after)?;
-            remarks.extend(sides::order(before, after));
-            let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
-            let old = match described {
-                Some(_) => Protocol::Combined,
-                None => protocol(before, "the reference")?,
-            };
-            let mut report = match (old, kind) {
-                (_, _) if described.is_some() => {
-                    let geometry =
-                        described.ok_or_else(|| Error::new(DataCode::MuscleInvalid, "no dimensions"))?;
-                    catalogue::compare(whole, given, geometry, options)?
-                }
-                (Protocol::Held, Protocol::Held) => held(before, after, options)?,
-                (Protocol::Stroked, Protocol::Stroked) => {
-                    let compared = stroked::compare(before, after, 0.0)?;
-                    strokes(&compared, options)?
-                }
-                (Protocol::Combined, Protocol::Combined | Protocol::Stroked)
-                | (Protocol::Stroked, Protocol::Combined) => {
-                    let (runs, plane) = combined::of(before, after, options.mounted)?;
-                    let mut surface = Surface::of(&runs)?;
-                    plane.into_slopes(&mut surface, &runs.strokes);
-                    recorded(runs, surface, options)?
-                }
-                _ => {
-                    return Err(Error::new(
-                        DataCode::RecordingOutOfRange,
-                        "one side holds the length, the other strokes",
-                    )
-                    .help("give recordings of the same protocol on both sides"));
-                }
-            };
-            report.reference.files = files(before);
-            report.reference.samples = whole.samples();
-            report.remarks.splice(0..0, remarks);
-            report
-        }
-        (Against::Table(table, path), kind) => {
-            let other = same_actuator(table, options)?;
-            let mut report = match kind {
-                Protocol::Held => against_table(table, after, Runs::alone(after, options.mounted)?, options)?,
-                Protocol::Combined => {
-                    let runs = combined::alone(table, after, options.mounted)?;
-                    against_table(table, after, runs, options)?
-                }
-                Protocol::Stroked => stroked_against_table(table, after, options)?,
-            };
-            report.reference.table = Some(path.to_owned());
-            report.remarks.splice(0..0, other);
-            report.reference.repeatability_from = Repeatability::Assumed;
-            report
-        }
+    let mut report = match against {
+        Against::Recordings(before) => beside_recordings(before, (given, after), kind, options)?,
+        Against::Table(table, path) => beside_table(table, path, after, kind, options)?,
     };
     report.samples = given.samples();
     report.muscle.clone_from(&options.muscle);
     withdraw(&mut report);
+    Ok(report)
+}
+
+/// AFTER, as it was given and in parts, beside earlier recordings.
+fn beside_recordings(
+    whole: &Campaign,
+    (given, after): (&Campaign, &Campaign),
+    kind: Protocol,
+    options: &Options,
+) -> Result<ChangeReport> {
+    for r in &whole.recordings {
+        r.require_force()?;
+    }
+    sides::apart(whole, given)?;
+    let before = &stages::parted(whole);
+    let mut remarks = units::check(before, after)?;
+    remarks.extend(sides::order(before, after));
+    let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
+    let mut report = match described {
+        Some(geometry) => catalogue::compare(whole, given, geometry, options)?,
+        None => by_protocol(before, after, kind, options)?,
+    };
+    report.reference.files = files(before);
+    report.reference.samples = whole.samples();
+    report.remarks.splice(0..0, remarks);
+    Ok(report)
+}
+
+/// Two campaigns of an actuator without a description, by the way in which both were recorded.
+fn by_protocol(
+    before: &Campaign,
+    after: &Campaign,
+    kind: Protocol,
+    options: &Options,
+) -> Result<ChangeReport> {
+    match (protocol(before, "the reference")?, kind) {
+        (Protocol::Held, Protocol::Held) => held(before, after, options),
+        (Protocol::Stroked, Protocol::Stroked) => strokes(&stroked::compare(before, after, 0.0)?, options),
+        (Protocol::Combined, Protocol::Combined | Protocol::Stroked)
+        | (Protocol::Stroked, Protocol::Combined) => {
+            let (runs, plane) = combined::of(before, after, options.mounted)?;
+            let mut surface = Surface::of(&runs)?;
+            plane.into_slopes(&mut surface, &runs.strokes);
+            recorded(runs, surface, options)
+        }
+        _ => {
+            let what = "one side holds the length, the other strokes";
+            Err(Error::new(DataCode::RecordingOutOfRange, what)
+                .help("give recordings of the same protocol on both sides"))
+        }
+    }
+}
+
+/// AFTER beside a table.
+fn beside_table(
+    table: &TableFile,
+    path: &str,
+    after: &Campaign,
+    kind: Protocol,
+    options: &Options,
+) -> Result<ChangeReport> {
+    let other = same_actuator(table, options)?;
+    let mut report = match kind {
+        Protocol::Held => against_table(table, after, Runs::alone(after, options.mounted)?, options)?,
+        Protocol::Combined => {
+            let runs = combined::alone(table, after, options.mounted)?;
+            against_table(table, after, runs, options)?
+        }
+        Protocol::Stroked => stroked_against_table(table, after, options)?,
+    };
+    report.reference.table = Some(path.to_owned());
+    report.remarks.splice(0..0, other);
+    report.reference.repeatability_from = Repeatability::Assumed;
     Ok(report)
 }
 

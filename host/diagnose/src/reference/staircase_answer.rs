@@ -156,16 +156,16 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
     let freedom = SCALE_PRIOR + analysis.contrast.taught.min(analysis.contrast.free);
     let own = std::slice::from_ref(&accepted.shape);
     let (unseen, _) = held_out::unseen(&analysis.cells, &analysis.contrast, own);
-    let class = analysis.first.posterior.classes().get(&about.class).copied().unwrap_or(0.0);
+    let class = analysis.first.posterior.classes().get(&about.changed.class).copied().unwrap_or(0.0);
     Changed {
-        change: about.change,
+        change: accepted.change,
         effect: about.name.into(),
         probability: accepted.probability,
         class_probability: class.max(accepted.probability),
-        class: about.class,
+        class: about.changed.class,
         share_explained: unseen.share().max(0.0),
         parameters: vec![size(
-            about.parameter,
+            about.changed.size,
             accepted.size,
             accepted.std * widened(analysis),
             freedom,
@@ -173,7 +173,7 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
         )],
         confusable_with: confusable(analysis, accepted),
         since: localise::since(analysis, accepted),
-        owner: about.owner,
+        owner: about.changed.owner,
         correction: accepted.change.is_bench(),
         rms_N: rms_after(&analysis.cells, &accepted.shape) * accepted.size.abs(),
     }
@@ -217,7 +217,7 @@ fn alone(analysis: &Analysis) -> Vec<(String, Size)> {
         (
             about.name.to_owned(),
             size(
-                about.parameter,
+                about.changed.size,
                 e.size,
                 e.std * widened(analysis),
                 freedom,
@@ -237,11 +237,12 @@ fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
     let middle = SIZES[1] * analysis.surface.largest;
     let open = |change: Change| !analysis.accepted.iter().any(|a| a.change == change);
     CHANGES
-        .iter()
-        .filter(|about| open(about.change))
-        .map(|about| {
-            let p = round.posterior.probability(Cause::Named(about.change));
-            let estimate = round.estimates.iter().find(|e| e.change == about.change);
+        .into_iter()
+        .filter(|change| open(*change))
+        .map(|change| {
+            let about = change.about();
+            let p = round.posterior.probability(Cause::Named(change));
+            let estimate = round.estimates.iter().find(|e| e.change == change);
             let detectable = estimate.map(|e| {
                 // What the prior, a lead of e³ and the price of the size require of the evidence; 1.28: with 90 %.
                 let price = (middle / e.rms / e.std).powi(2).ln_1p();
@@ -253,7 +254,7 @@ fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
                 gain: p,
                 why_not: WhyNot::of(detectable.is_some(), p),
                 detectable: detectable.filter(|d| d.is_finite()),
-                unit: about.parameter.1.into(),
+                unit: about.changed.size.1.into(),
             }
         })
         .collect()

@@ -64,7 +64,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
                 gain: weighed.marginal(*c),
                 why_not: WhyNot::of(true, weighed.marginal(*c)),
                 detectable: weighed.alone.get(c).map(|(_, std)| std * (3.5 + 1.28)),
-                unit: c.about().parameter.1.into(),
+                unit: c.about().changed.size.1.into(),
             })
             .collect(),
         set: probabilities.iter().filter(|p| p.probability >= 0.05).map(|p| p.cause.clone()).collect(),
@@ -84,7 +84,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
             .iter()
             .map(|(c, (value, std))| {
                 let about = c.about();
-                (about.name.to_owned(), size(about.parameter, *value, *std, 1e6, 0.0))
+                (about.name.to_owned(), size(about.changed.size, *value, *std, 1e6, 0.0))
             })
             .collect(),
         curves: stroke_curves(compared, &weighed, &named),
@@ -111,7 +111,7 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
     let shape = &compared.shapes[index];
     let mut competitors: Vec<String> = stroked::ASKED
         .iter()
-        .filter(|c| **c != change && c.class() == about.class && weighed.marginal(**c) >= 0.05)
+        .filter(|c| **c != change && c.class() == about.changed.class && weighed.marginal(**c) >= 0.05)
         .map(|c| c.name().to_owned())
         .collect();
     if change == Change::ForceGain {
@@ -122,13 +122,13 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
         change,
         effect: about.name.into(),
         probability: weighed.marginal(change),
-        class_probability: weighed.class(about.class),
-        class: about.class,
+        class_probability: weighed.class(about.changed.class),
+        class: about.changed.class,
         share_explained: (1.0 - (after / before.max(f64::MIN_POSITIVE)).powi(2)).clamp(0.0, 1.0),
-        parameters: vec![size(about.parameter, value, std, 1e6, 0.0)],
+        parameters: vec![size(about.changed.size, value, std, 1e6, 0.0)],
         confusable_with: competitors,
         since: Since::NotDetermined,
-        owner: about.owner,
+        owner: about.changed.owner,
         correction: change.is_bench(),
         rms_N: (shape.norm_squared() / shape.len().max(1) as f64).sqrt() * value.abs(),
     }

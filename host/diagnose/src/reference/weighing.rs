@@ -96,13 +96,13 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
     let still = by.lag.map_or(0.0, |l| l.unchanged);
     let mut estimates = Vec::new();
     let mut courses: Vec<(Change, Course)> = Vec::new();
-    for about in CHANGES {
-        let candidate = candidate(cells, about.change, by.moving);
+    for change in CHANGES {
+        let candidate = candidate(cells, change, by.moving);
         let course = candidate.and_then(|c| course::of(cells, contrast, &c, scale, &sizes));
         let Some(course) = course.filter(|c| c.log.is_finite()) else { continue };
-        let shape = whole(cells, about.change).unwrap_or_else(|| course.shape.clone());
-        estimates.extend(estimate(cells, contrast, about.change, &shape));
-        courses.push((about.change, course));
+        let shape = whole(cells, change).unwrap_or_else(|| course.shape.clone());
+        estimates.extend(estimate(cells, contrast, change, &shape));
+        courses.push((change, course));
     }
     let units: Vec<DVector<f64>> =
         courses.iter().map(|(_, c)| &c.shape / rms_after(cells, &c.shape)).collect();

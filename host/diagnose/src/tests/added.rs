@@ -5,6 +5,7 @@ mod stroke_ripple;
 
 use super::*;
 use crate::candidates::Law;
+use crate::reference::shapes::{self, Class, Owner};
 
 model_core::effect_list! {
     /// Effects beyond the catalogue.
@@ -42,6 +43,15 @@ fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
     assert!((size - 3.0).abs() < 0.3 && (period - 4.0e-3).abs() < 1e-4, "{size} N over {period} m");
 }
 
+#[test]
+fn what_a_comparison_says_of_its_change_stands_in_its_file() {
+    let about =
+        shapes::of_file(AddedName::StrokeRipple.info(), AddedName::StrokeRipple.traits()).expect("a change");
+    assert_eq!(about.name, "stroke-ripple");
+    assert_eq!(about.changed.class, Class::Alone("stroke-ripple"));
+    assert_eq!((about.changed.owner, about.changed.remembers), (Owner::Rig, false));
+}
+
 /// An effect is defined in its file: no other production code of the diagnosis knows one by its name.
 #[test]
 fn no_effect_is_known_by_its_name() {
@@ -50,11 +60,9 @@ fn no_effect_is_known_by_its_name() {
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
             let path = entry.path();
-            // The comparison with a reference lists its changes in one table, and the history its one law.
-            let apart = ["tests", "reference", "history"].iter().any(|name| path.ends_with(name));
-            if path.is_dir() && !apart {
+            if path.is_dir() && !path.ends_with("tests") {
                 folders.push(path);
-            } else if path.is_file() && !path.ends_with("tests.rs") && !path.ends_with("history.rs") {
+            } else if path.is_file() && !path.ends_with("tests.rs") {
                 let text = std::fs::read_to_string(&path).expect("a source file");
                 let production = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
                 let named =

@@ -10,7 +10,8 @@
 //! over a travel of `η b`, as the joint does not bear all at once and the braid gives a little before it slides.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, decay,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits, decay,
 };
 use model_core::scalar::Scalar;
 
@@ -36,8 +37,10 @@ impl Effect for Backlash {
         source: "play operator; sensitivity of the base model",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::RigidBar).check(BenchCheck::RigidBar).consistent(no_looser_than_free);
+    const TRAITS: Traits = Traits::shown_by(Experiment::RigidBar)
+        .check(BenchCheck::RigidBar)
+        .consistent(no_looser_than_free)
+        .changed(Changed::new(Class::Alone(Self::INFO.name), Owner::Rig, "a loose joint").remembering());
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play, last direction]

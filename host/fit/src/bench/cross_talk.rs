@@ -3,7 +3,8 @@
 //! `c`, m²: thrust on an end cap, a hose that straightens. Pressurise with the muscle disconnected, or blocked at both ends.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits, Vented,
 };
 use model_core::scalar::Scalar;
 
@@ -25,8 +26,10 @@ impl Effect for CrossTalk {
         source: "end-cap thrust; 0.1 to 5 N per 100 kPa",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::DeadWeights).check(BenchCheck::DeadWeights).vented(Vented::Everything);
+    const TRAITS: Traits = Traits::shown_by(Experiment::DeadWeights)
+        .check(BenchCheck::DeadWeights)
+        .vented(Vented::Everything)
+        .changed(Changed::new(Class::Gain, Owner::Rig, "ΔF = c·P").sized("thrust_area", "m²"));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pressure

@@ -3,7 +3,8 @@
 //! `γ` (dimensionless), `γ_2`, 1/N; `F`, N, the base model's force. Hang known weights.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter,
+    Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -30,7 +31,8 @@ impl Effect for ForceGain {
 
     const TRAITS: Traits = Traits::shown_by(Experiment::DeadWeights)
         .check(BenchCheck::DeadWeights)
-        .imitates(Imitates::Description);
+        .imitates(Imitates::Description)
+        .changed(Changed::new(Class::Gain, Owner::Sensor, "ΔF = γ·F").sized("gain", ""));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let pull = context.force();

@@ -3,7 +3,8 @@
 //! Ten seconds of a vented, slack muscle at either end of a recording settle it; without them free tables absorb it.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits, Vented,
 };
 use model_core::scalar::Scalar;
 
@@ -25,8 +26,10 @@ impl Effect for ForceOffset {
         source: "zero balance of ±1 to 5 % of rated output before taring: manufacturers of load cells",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::VentedReadings).check(BenchCheck::Weighing).vented(Vented::Constant);
+    const TRAITS: Traits = Traits::shown_by(Experiment::VentedReadings)
+        .check(BenchCheck::Weighing)
+        .vented(Vented::Constant)
+        .changed(Changed::new(Class::Zero, Owner::Sensor, "ΔF = b").sized("offset", "N"));
 
     fn force<T: Scalar>(parameters: &[T], _context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0]

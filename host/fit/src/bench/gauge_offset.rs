@@ -4,7 +4,8 @@
 //! gauge's zero". Read the gauge with the muscle vented.
 
 use model_core::effects::{
-    Context, Effect, Experiment, Imitates, Info, Link, Memory, Parameter, Start, Traits,
+    Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter, Start,
+    Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -26,7 +27,9 @@ impl Effect for GaugeOffset {
         source: "usual gauge accuracy, 0.1 to 0.5 % of full scale; sensitivity of the base model",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge).imitates(Imitates::Deadband);
+    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge).imitates(Imitates::Deadband).changed(
+        Changed::new(Class::GaugeOffset, Owner::SensorOrMuscle, "ΔF = −δ·∂F/∂P").sized("offset", "Pa"),
+    );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pull_per_pressure()

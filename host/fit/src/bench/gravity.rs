@@ -4,7 +4,8 @@
 //! or chain lifted). The constant is a force offset under another name: weigh it, or turn the bench by 90°.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, Vented,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits, Vented,
 };
 use model_core::scalar::Scalar;
 
@@ -29,8 +30,10 @@ impl Effect for Gravity {
         source: "Newton; 0.5 to 5 N for a hanging muscle",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::Weighing).check(BenchCheck::Weighing).vented(Vented::Constant);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Weighing)
+        .check(BenchCheck::Weighing)
+        .vented(Vented::Constant)
+        .changed(Changed::new(Class::Zero, Owner::Rig, "weight in the load path"));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let g = T::from_f64(9.806_65);

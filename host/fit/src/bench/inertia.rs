@@ -2,7 +2,9 @@
 //!
 //! `m`, kg: moving head, fittings and half the muscle. Seen at turns and in fast runs only: 20 mN for 1 kg at 20 mm/s².
 
-use model_core::effects::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use model_core::effects::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -23,7 +25,11 @@ impl Effect for Inertia {
         source: "Newton; moving heads of 0.1 to 2 kg",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).changed(Changed::new(
+        Class::Alone(Self::INFO.name),
+        Owner::Rig,
+        "moving masses",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -parameters[0] * context.acceleration

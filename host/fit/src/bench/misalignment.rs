@@ -5,7 +5,8 @@
 //! the force on the guide.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits, stroke_direction,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits, stroke_direction,
 };
 use model_core::scalar::Scalar;
 
@@ -30,8 +31,10 @@ impl Effect for Misalignment {
         source: "statics of an inclined pull",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::DeadWeights).check(BenchCheck::DeadWeights).consistent(guide_rubs);
+    const TRAITS: Traits = Traits::shown_by(Experiment::DeadWeights)
+        .check(BenchCheck::DeadWeights)
+        .consistent(guide_rubs)
+        .changed(Changed::new(Class::Friction, Owner::Rig, "muscle and cell out of line"));
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke

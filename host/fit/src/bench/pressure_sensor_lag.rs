@@ -4,7 +4,9 @@
 //! `τ`, s. First order: for ramps slower than the sensor. Invisible while the pressure is constant. The muscle's own lag behind the
 //! regulator (`pressure-lag`) has the opposite sign.
 
-use model_core::effects::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use model_core::effects::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -25,7 +27,10 @@ impl Effect for PressureSensorLag {
         source: "first-order sensor; time constants of 1 to 50 ms are usual",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps);
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps).changed(
+        Changed::new(Class::PressureSensorLag, Owner::Sensor, "P reads late by a first-order lag τ")
+            .sized("time_constant", "s"),
+    );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pull_per_pressure() * context.pressure_rate

@@ -10,7 +10,8 @@
 //! place.
 
 use model_core::effects::{
-    BenchCheck, Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
+    Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -35,8 +36,10 @@ impl Effect for RigCompliance {
         source: "first-order sensitivity of the base model; frames of 0.5 to 50 N/µm",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::RigidBar).check(BenchCheck::RigidBar).consistent(gives_alike);
+    const TRAITS: Traits = Traits::shown_by(Experiment::RigidBar)
+        .check(BenchCheck::RigidBar)
+        .consistent(gives_alike)
+        .changed(Changed::new(Class::Gain, Owner::Rig, "ΔF = c·F·∂F/∂x").sized("compliance", "m/N"));
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [z, last stroke, seen]

@@ -9,7 +9,7 @@
 //! choose from.
 
 use model_core::effects::{
-    Context, Effect, Experiment, Fading, Info, Link, Memory, Parameter, Start, Traits,
+    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, Memory, Owner, Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -49,7 +49,9 @@ impl Effect for SensorDelay {
         source: "first-order filter or skew; 1 to 100 ms are usual",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds).consistent(passes_no_more);
+    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds)
+        .consistent(passes_no_more)
+        .changed(Changed::new(Class::SensorDelay, Owner::Sensor, "F(t) = S(P(t − τ))").sized("delay", "s"));
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let time = parameters[3];

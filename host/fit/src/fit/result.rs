@@ -6,7 +6,7 @@ use model_core::units::{Force, Length, Pressure};
 
 use crate::error::FitCode;
 use crate::table_faults::table_faults;
-use crate::table_file::Uncertainty;
+use crate::table_file::{About, TableFile, Uncertainty, stored_mountings};
 use pam_data::error::{Error, Result};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::progress::Progress;
@@ -92,6 +92,20 @@ impl Fit {
 }
 
 impl Fit {
+    /// The table as a file keeps it, with all that the fit says of it. Date, sources and corrections are the caller's.
+    #[must_use]
+    pub fn table_file(&self, tool: String) -> TableFile {
+        let about = About {
+            muscle: self.summary.muscle.clone(),
+            tool,
+            fit: self.summary.quality(),
+            uncertainty: Some(self.stored_uncertainty()),
+            mountings: stored_mountings(&self.solution.problem),
+            ..About::default()
+        };
+        TableFile { table: self.table.clone(), about }
+    }
+
     /// The uncertainty as a table file keeps it: no more columns than numbers.
     #[must_use]
     pub fn stored_uncertainty(&self) -> Uncertainty {

@@ -178,7 +178,7 @@ fn changed(c: &Changed) -> ChangedDocument<'_> {
         since: &c.since,
         owner: c.owner,
         correction: c.correction,
-        law: c.change.about().law,
+        law: c.change.about().changed.law,
         remedy: wording::remedy(c.change),
         rms_N: c.rms_N,
     }

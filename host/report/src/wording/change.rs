@@ -126,7 +126,7 @@ pub fn remedy(change: Change) -> &'static str {
         Change::PressureSensorLag => {
             "look for a long or throttled line to the pressure sensor, and at its filter"
         }
-        Change::Effect(_) => match (change.about().owner, change.class()) {
+        Change::Effect(_) => match (change.about().changed.owner, change.class()) {
             (Owner::Rig, _) => "look at the load path between muscle and load cell",
             (_, Class::RateOrPhase) => "look at hoses, valves and filters, then refit the table",
             (_, Class::Softening | Class::Relaxation) => {
@@ -317,7 +317,7 @@ fn one(text: &mut String, m: &Changed) {
     for s in &m.parameters {
         let _ = writeln!(text, "  how large   {} {} (95 %)", s.name, size(s));
     }
-    let _ = writeln!(text, "  law         {}", m.change.about().law);
+    let _ = writeln!(text, "  law         {}", m.change.about().changed.law);
     let _ = writeln!(text, "  since when  {}", since(&m.since));
     let _ = writeln!(text, "  whose       {}", owner(m.owner));
     let _ = writeln!(text, "  what to do  {}", remedy(m.change));

@@ -11,6 +11,7 @@ use crate::console::Console;
 use crate::documents::{device, text};
 use pam_data::error::Result;
 use pam_data::pluralise::pluralise;
+use pam_device::recorder::Device;
 use pam_device::{Client, Patience, Port, messages, recorder};
 
 pub(super) fn run(port: &PortOption, json: bool, console: &Console) -> Result<()> {
@@ -75,13 +76,9 @@ fn versions(hello: &Hello) -> String {
 }
 
 fn document(hello: &Hello, info: &DeviceInfo, status: &Status, settings: &Settings) -> device::Info {
-    let about = recorder::about_device(hello, info, settings);
-    let mut device = about.as_object().cloned().unwrap_or_default();
-    // `schema` names the document here; the schema of the link is `link_schema`.
-    device.remove("schema");
     device::Info {
         schema: "pam-device/1",
-        device,
+        device: Device::of(hello, info, settings),
         link_schema: format!("{:016x}", hello.schema_hash),
         muscles: info.muscles,
         table_capacity: info.table_capacity,

@@ -5,20 +5,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use model_core::link::endpoints::{GetInfo, GetSettings, GetStatus};
 use pam_data::error::Result;
+use pam_data::output::json_of;
 use pam_data::pluralise::pluralise;
 use pam_data::progress::Progress;
 use pam_device::reachability::Reachability;
-use pam_device::recorder::{Recorder, about_losses, about_start};
+use pam_device::recorder::{About, Ended, Recorder};
 use pam_device::run::{Ending, Plan, run};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_device::{Client, Losses, messages};
-use serde_json::{Value, json};
 
 use super::Arguments;
 use super::tracking_error::TrackingError;
 use crate::change_watch::{self, ChangeWatch};
 use crate::commands::recording_files::{begin, end, warn_of_losses};
 use crate::console::Console;
+use crate::documents::recording::{Run, RunOutcome, RunRequest};
 use crate::progress::ProgressLine;
 
 /// Share of a run in saturation from which it is reported: a step exceeds the limits for a moment without harm.
@@ -40,12 +41,12 @@ pub(super) struct Session {
     changed: Option<ChangeWatch>,
     recorder: Option<Recorder>,
     /// How the run was made, for the recording and for `--json`.
-    about: Value,
+    about: Run,
 }
 
 /// What is printed at the end of a run.
 pub(super) struct Report {
-    about: Value,
+    about: Run,
     summary: String,
     changed: Option<String>,
 }
@@ -54,7 +55,7 @@ impl Report {
     /// Prints it.
     pub(super) fn print(self, json: bool, console: &Console) {
         if json {
-            console.result(format!("{:#}", self.about));
+            console.result(format!("{:#}", json_of(&self.about)));
             return;
         }
         console.result(self.summary);
@@ -77,11 +78,13 @@ impl Session {
         let ticks = f64::from(client.call::<GetInfo>(&())?.ticks_per_s);
         let every_ticks =
             arguments.rate.map_or(1.0, |rate| (ticks / rate).round()).clamp(1.0, 60_000.0) as u16;
-        let mut about = about_start("pam-run/1", client)?;
-        about["mode"] = json!(messages::mode(quantity.mode()));
-        about["setpoint_profile"] = json!(arguments.quantity.text());
-        about["stiffness_Nm_per_rad"] = json!(arguments.stiffness);
-        about["unit"] = json!(quantity.unit());
+        let mut about = Run::watched(About::of("pam-run/1", client)?);
+        about.request = Some(RunRequest {
+            mode: messages::mode(quantity.mode()),
+            setpoint_profile: arguments.quantity.text().map(str::to_owned),
+            stiffness_Nm_per_rad: arguments.stiffness.map(f64::from),
+            unit: quantity.unit(),
+        });
         let recorder = begin(&arguments.output, &about, console)?;
         let tracking = TrackingError::new(client.call::<GetSettings>(&())?.joint);
         let saturated_before = client.call::<GetStatus>(&())?.saturated_ticks;
@@ -150,18 +153,14 @@ impl Session {
         let saturated = status.map(|status| status.saturated_ticks.wrapping_sub(self.saturated_before));
         let samples_per_s = self.ticks / f64::from(self.every_ticks);
         let changed = change_watch::finish(self.changed.take());
-        let about = &mut self.about;
-        about["samples"] = json!(self.tracking.all.samples);
-        about["tracking_rms"] = json!(self.tracking.all.rms(self.quantity));
-        about["tracking_rms_after_1_s"] = json!(self.tracking.settled.rms(self.quantity));
-        about["losses"] = about_losses(losses);
-        about["saturated_ticks"] = json!(saturated);
-        about["reach"] = json!(self.reachability.as_ref().map(|r| r.to_json(samples_per_s)));
-        about["changed"] = json!(changed.as_ref().map(|c| &c.1));
-        about["ended_by"] = json!(match &outcome {
-            Ok(Ending::Done) => "time".to_owned(),
-            Ok(Ending::Stopped) => "interrupt".to_owned(),
-            Err(e) => e.to_string(),
+        self.about.ended = Some(Ended::of(&outcome, losses));
+        self.about.outcome = Some(RunOutcome {
+            samples: self.tracking.all.samples,
+            tracking_rms: self.tracking.all.rms(self.quantity),
+            tracking_rms_after_1_s: self.tracking.settled.rms(self.quantity),
+            saturated_ticks: saturated,
+            reach: self.reachability.as_ref().map(|r| r.times(samples_per_s)),
+            changed: changed.as_ref().map(|c| c.1.clone()),
         });
         // The recording is complete up to a fault, and is kept: it shows what led to the fault.
         let kept = self.recorder.take().map(|recorder| end(recorder, &self.about, console)).transpose();

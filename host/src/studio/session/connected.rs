@@ -13,19 +13,19 @@ use model_core::link::endpoints::{
 use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry};
 use model_core::link::settings::Settings;
-use serde_json::{Value, json};
 use tokio::sync::broadcast;
 
-use super::super::events::{batch, compared, credible, tell};
+use super::super::answers::{Answer, Difference, Ended, Faults, Flashed, StoredSettings};
+use super::super::events::{Controller, batch, compared, credible, tell};
 use super::{Order, no_controller, report};
 use crate::change_watch::ChangeWatch;
 use crate::demo::campaign::muscle;
+use crate::documents::recording::Run;
 use pam_data::error::{DataCode, Error, Result};
-use pam_data::output::json_of;
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
 use pam_device::reachability::Reachability;
-use pam_device::recorder::{Recorder, about_losses, about_start, serial};
+use pam_device::recorder::{self, About, Recorder, serial};
 use pam_device::run::{Plan, Steps, arm, release, vent};
 use pam_device::setpoint_profile::Quantity;
 use pam_device::{Address, Client, Losses, Subscription, Topic, VentLine, messages, table_diff, tables};
@@ -48,7 +48,7 @@ pub struct Connected {
     emulated: Option<(Emulated, Arc<AtomicU8>)>,
     running: Option<(Quantity, Steps, Option<u64>)>,
     /// A recording, what it says of itself, and what was lost before it began.
-    recorder: Option<(Recorder, Value, Losses)>,
+    recorder: Option<(Recorder, Run, Losses)>,
     fault: Option<String>,
     changed: Option<ChangeWatch>,
     batch: Vec<Telemetry>,
@@ -159,25 +159,26 @@ impl Connected {
     }
 
     /// The state for the page.
-    pub(super) fn report(&mut self) -> Value {
+    pub(super) fn report(&mut self) -> Controller {
         self.reported = Instant::now();
         let hello = self.client.hello();
         let (major, minor, patch) = hello.release;
         let losses = self.client.losses();
-        json!({
-            "k": "s", "connected": true,
-            "port": self.client.port(),
-            "board": Board::from_code(hello.board).map_or("unknown", Board::name),
-            "serial": serial(hello),
-            "release": format!("{major}.{minor}.{patch}"),
-            "emulated": self.emulated.as_ref().map(|e| if e.0.kind() == Kind::Qemu { "QEMU" } else { "in this process" }),
-            "state": messages::state(self.status.state),
-            "mode": messages::mode(self.status.mode),
-            "fault": self.fault,
-            "lost": losses.samples, "bad_frames": losses.bad_frames,
-            "recording": self.recorder.as_ref().map(|r| r.0.rows()),
-            "credible": credible(&self.settings),
-        })
+        let place = |e: &(Emulated, _)| if e.0.kind() == Kind::Qemu { "QEMU" } else { "in this process" };
+        Controller {
+            port: self.client.port().to_owned(),
+            board: Board::from_code(hello.board).map_or("unknown", Board::name),
+            serial: serial(hello),
+            release: format!("{major}.{minor}.{patch}"),
+            emulated: self.emulated.as_ref().map(place),
+            state: messages::state(self.status.state),
+            mode: messages::mode(self.status.mode),
+            fault: self.fault.clone(),
+            lost: losses.samples,
+            bad_frames: losses.bad_frames,
+            recording: self.recorder.as_ref().map(|r| r.0.rows()),
+            credible: credible(&self.settings),
+        }
     }
 
     /// Takes what the controller sends for some milliseconds.
@@ -271,7 +272,7 @@ impl Connected {
     }
 
     /// Carries out an order to a connected controller.
-    pub(super) fn obey(&mut self, order: Order) -> Result<Value> {
+    pub(super) fn obey(&mut self, order: Order) -> Result<Answer> {
         match order {
             Order::Replace(_) | Order::IsConnected(_) | Order::Disconnect => return Err(no_controller()),
             Order::Arm => {
@@ -302,7 +303,7 @@ impl Connected {
             }
             Order::Faults => {
                 let faults = self.client.call::<GetFaults>(&())?;
-                return Ok(json!({ "latched": faults.latched.as_ref().map(messages::report) }));
+                return Ok(Answer::Faults(Faults { latched: faults.latched.as_ref().map(messages::report) }));
             }
             Order::Clear => {
                 let cleared = self.client.call_once::<ClearFault>(&());
@@ -324,7 +325,7 @@ impl Connected {
             Order::Flash(path) => return self.flash(&path),
             Order::Record(path) => {
                 self.end_recording()?;
-                let about = about_start("pam-run/1", &mut self.client)?;
+                let about = Run::watched(About::of("pam-run/1", &mut self.client)?);
                 let recorder = Recorder::create(std::slice::from_ref(&path), &about)?;
                 self.recorder = Some((recorder, about, self.client.losses()));
             }
@@ -333,14 +334,13 @@ impl Connected {
                     reference.map(|reference| ChangeWatch::start(reference, Mounted::Same)).transpose()?;
             }
             Order::EndRecord => {
-                let path = self.end_recording()?;
-                return Ok(json!({ "path": path.map(|p| p.display().to_string()) }));
+                return Ok(Answer::Ended(Ended { path: self.end_recording()? }));
             }
         }
-        Ok(Value::Null)
+        Ok(Answer::Done)
     }
 
-    fn settings(&mut self, changes: &[String]) -> Result<Value> {
+    fn settings(&mut self, changes: &[String]) -> Result<Answer> {
         let mut settings = self.client.call::<GetSettings>(&())?;
         if !changes.is_empty() {
             for change in changes {
@@ -356,18 +356,24 @@ impl Connected {
             }
         }
         self.settings = settings;
-        Ok(json!({ "stored": json_of(&settings), "defaults": json_of(&Settings::default()) }))
+        Ok(Answer::Settings(Box::new(StoredSettings { stored: settings, defaults: Settings::default() })))
     }
 
-    fn difference(&mut self, path: &std::path::Path) -> Result<Value> {
+    fn difference(&mut self, path: &std::path::Path) -> Result<Answer> {
         let new = TableFile::read(path)?;
         let before = tables::read(&mut self.client, Side::Agonist)?;
-        let Some(before) = before else { return Ok(json!({ "text": "the device has no table yet" })) };
-        let old = image::read(&before).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-        Ok(json!({ "text": table_diff::between(&old, &new.table).to_text() }))
+        let text = match before {
+            Some(before) => {
+                let old =
+                    image::read(&before).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
+                table_diff::between(&old, &new.table).to_text()
+            }
+            None => "the device has no table yet".to_owned(),
+        };
+        Ok(Answer::Difference(Difference { text, table: path.display().to_string() }))
     }
 
-    fn flash(&mut self, path: &std::path::Path) -> Result<Value> {
+    fn flash(&mut self, path: &std::path::Path) -> Result<Answer> {
         let file = TableFile::read(path)?;
         let mut buffer = [0; image::MAX_LEN];
         let image = image::write(&file.table, &mut buffer)
@@ -381,14 +387,18 @@ impl Connected {
             )?;
         }
         let kept = tables::write(&mut self.client, Side::Agonist, image, |_| ())?;
-        Ok(json!({ "crc": format!("{:08x}", kept.crc), "bytes": kept.length, "generation": kept.generation }))
+        Ok(Answer::Flashed(Flashed {
+            crc: format!("{:08x}", kept.crc),
+            bytes: kept.length,
+            generation: kept.generation,
+        }))
     }
 
     /// Ends the recording, if there is one.
     pub(super) fn end_recording(&mut self) -> Result<Option<PathBuf>> {
         let Some((recorder, mut about, before)) = self.recorder.take() else { return Ok(None) };
-        about["losses"] = about_losses(self.client.losses().since(before));
-        about["ended_by"] = json!("the page");
+        let losses = self.client.losses().since(before);
+        about.ended = Some(recorder::Ended { losses, ended_by: "the page".to_owned() });
         recorder.finish(&about).map(Some)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Guess, Source};
+use super::{Guess, GuessedColumn, Source};
 
 /// Quotes a text for TOML.
 pub(super) fn quoted(text: &str) -> String {
@@ -35,7 +35,30 @@ pub(super) fn description(guess: &Guess) -> String {
     for line in guess.unknown.iter().chain(&guess.checks) {
         let _ = writeln!(out, "# - {line}");
     }
-    let _ = writeln!(out, "description = {}", quoted(&format!("files such as {}", guess.file)));
+    out += &file_form(guess);
+    for column in &guess.columns {
+        out += &column_table(column);
+    }
+    for (column, value) in &guess.filters {
+        let _ = writeln!(
+            out,
+            "\n# Takes the rows of the muscle whose description is given.\n[where]\n{} = {}",
+            key(column),
+            quoted(value)
+        );
+    }
+    if let Some(lookup) = &guess.lookup {
+        let keys: Vec<String> =
+            lookup.keys.iter().map(|(theirs, own)| format!("{} = {}", key(theirs), quoted(own))).collect();
+        let _ =
+            writeln!(out, "\n[lookup]\nfile = {}\nmatch = {{ {} }}", quoted(&lookup.file), keys.join(", "));
+    }
+    out
+}
+
+/// How to read the file: sheet, header, delimiter, parts.
+fn file_form(guess: &Guess) -> String {
+    let mut out = format!("description = {}\n", quoted(&format!("files such as {}", guess.file)));
     if let Some(sheet) = &guess.sheet {
         let _ = writeln!(out, "sheet = {}", quoted(sheet));
     }
@@ -61,50 +84,39 @@ pub(super) fn description(guess: &Guess) -> String {
         let list: Vec<String> = guess.split_by.iter().map(|n| quoted(n)).collect();
         let _ = writeln!(out, "split_by = [{}]", list.join(", "));
     }
-    for column in &guess.columns {
-        let reference = match &column.source {
-            Source::Number(n) => n.to_string(),
-            Source::Named(name) | Source::Listed(name) => quoted(name),
-        };
-        let note = if matches!(column.source, Source::Number(_)) && column.header.parse::<usize>().is_err() {
-            format!("          # {}", column.header)
-        } else {
-            String::new()
-        };
-        let _ = writeln!(out, "\n[columns.{}]\ncolumn = {reference}{note}", column.quantity.name());
-        if !column.unit.is_empty() {
-            let _ = writeln!(out, "unit = {}", quoted(column.unit));
-        }
-        if column.scale != 1.0 {
-            let _ = writeln!(out, "scale = {}", number(column.scale));
-        }
-        if column.offset != 0.0 {
-            let _ = writeln!(out, "offset = {}", number(column.offset));
-        }
-        if column.extension {
-            out += "positive = \"extension\"\n";
-        }
-        if column.from_longest {
-            out += "zero = \"longest\"\n";
-        }
-        if !column.values.is_empty() {
-            let list: Vec<String> = column.values.iter().map(|(w, v)| format!("{} = {v}", key(w))).collect();
-            let _ = writeln!(out, "values = {{ {} }}", list.join(", "));
-        }
+    out
+}
+
+/// The table of one quantity.
+fn column_table(column: &GuessedColumn) -> String {
+    let reference = match &column.source {
+        Source::Number(n) => n.to_string(),
+        Source::Named(name) | Source::Listed(name) => quoted(name),
+    };
+    let note = if matches!(column.source, Source::Number(_)) && column.header.parse::<usize>().is_err() {
+        format!("          # {}", column.header)
+    } else {
+        String::new()
+    };
+    let mut out = format!("\n[columns.{}]\ncolumn = {reference}{note}\n", column.quantity.name());
+    if !column.unit.is_empty() {
+        let _ = writeln!(out, "unit = {}", quoted(column.unit));
     }
-    for (column, value) in &guess.filters {
-        let _ = writeln!(
-            out,
-            "\n# Takes the rows of the muscle whose description is given.\n[where]\n{} = {}",
-            key(column),
-            quoted(value)
-        );
+    if column.scale != 1.0 {
+        let _ = writeln!(out, "scale = {}", number(column.scale));
     }
-    if let Some(lookup) = &guess.lookup {
-        let keys: Vec<String> =
-            lookup.keys.iter().map(|(theirs, own)| format!("{} = {}", key(theirs), quoted(own))).collect();
-        let _ =
-            writeln!(out, "\n[lookup]\nfile = {}\nmatch = {{ {} }}", quoted(&lookup.file), keys.join(", "));
+    if column.offset != 0.0 {
+        let _ = writeln!(out, "offset = {}", number(column.offset));
+    }
+    if column.extension {
+        out += "positive = \"extension\"\n";
+    }
+    if column.from_longest {
+        out += "zero = \"longest\"\n";
+    }
+    if !column.values.is_empty() {
+        let list: Vec<String> = column.values.iter().map(|(w, v)| format!("{} = {v}", key(w))).collect();
+        let _ = writeln!(out, "values = {{ {} }}", list.join(", "));
     }
     out
 }

@@ -5,7 +5,7 @@
 
 use std::io::{self, Read, Write};
 
-use serde_json::json;
+use serde_json::Value;
 
 use super::super::mcap::{END, Encoder};
 use super::Tally;
@@ -125,7 +125,7 @@ impl<W: Write> Copy<'_, W> {
 
 /// The first record of a kind of a recording that begins.
 fn own(wanted: u8) -> io::Result<Vec<u8>> {
-    let begun = Encoder::new(&json!({}), 0).and_then(|mut e| e.take()).map_err(io::Error::other)?;
+    let begun = Encoder::new(&Value::Null, 0).and_then(|mut e| e.take()).map_err(io::Error::other)?;
     let mut rest = &begun[MAGIC.len()..];
     while let Some((kind, length)) = head(rest) {
         let (record, after) = rest.split_at_checked(HEAD + length as usize).unwrap_or((rest, &[]));

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::answer::{
     ChangeReport, Changed, Considered, Curve, HeldOut, Moment, NotComparable, Place, Probability, Reference,
-    Remark, Repeatability, Since, Split, Verdict, WhyNot, size,
+    Remark, Repeatability, Since, Size, Split, Verdict, WhyNot, size,
 };
 use super::super::criteria::{
     CATALOGUE_BINS, CATALOGUE_LAW_ERROR, CATALOGUE_USUAL, COURSE_LEAD, LOCALISE_STANDS_OUT, NAMED, SET, SIZES,
@@ -201,7 +201,7 @@ fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
             .collect(),
         confusable_with: accepted.competitors.iter().map(|c| c.name().to_owned()).collect(),
         since: since(cells, &accepted.fit),
-        owner: about.owner,
+        owner: about.changed.owner,
         correction: accepted.fit.change.is_bench(),
         rms_N: rms(&accepted.fit.trace),
     }
@@ -244,6 +244,60 @@ fn remarks(cells: &Cells) -> Vec<Remark> {
     all
 }
 
+/// What was not compared.
+fn not_comparable(cells: &Cells) -> Vec<NotComparable> {
+    let mut all = vec![];
+    if cells.ramps > 0.0 {
+        all.push(NotComparable::Ramps { share: cells.ramps });
+    }
+    if cells.unmatched > 0 {
+        all.push(NotComparable::States {
+            share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64,
+        });
+    }
+    all
+}
+
+/// The effects that were not accepted, with what could have been seen of them.
+fn considered(weighed: &Weighed, prior: f64) -> Vec<Considered> {
+    let open = |f: &&Fit| !weighed.accepted.iter().any(|a| a.fit.change == f.change);
+    let p_of = |name: &str| weighed.probabilities.iter().find(|(n, _)| n == name).map_or(0.0, |(_, p)| *p);
+    let share = ((1.0 - prior) / weighed.alone.len().max(1) as f64).max(1e-6);
+    let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
+    let one = |f: &Fit| {
+        let p = p_of(f.change.name());
+        let (_, unit, _, std) = f.parameters.first().copied().unwrap_or(("", "", 0.0, 0.0));
+        Considered {
+            effect: f.change.name().into(),
+            gain: p,
+            why_not: WhyNot::of(true, p),
+            detectable: Some(std * z).filter(|d| *d > 0.0 && d.is_finite()),
+            unit: unit.into(),
+        }
+    };
+    weighed.alone.iter().filter(open).map(one).collect()
+}
+
+/// The most probable causes that together have the probability of a set.
+fn set(weighed: &Weighed) -> Vec<String> {
+    let mut sum = 0.0;
+    let set = weighed.probabilities.iter().take_while(|(_, p)| {
+        let begun = sum < SET;
+        sum += p;
+        begun
+    });
+    set.map(|(n, _)| n.clone()).collect()
+}
+
+/// The size of each effect as the only one.
+fn alone(weighed: &Weighed) -> Vec<(String, Size)> {
+    let one = |f: &Fit| {
+        let (name, unit, value, std) = f.parameters.first()?;
+        Some((f.change.name().to_owned(), size((name, unit), *value, *std, 1e6, CATALOGUE_LAW_ERROR)))
+    };
+    weighed.alone.iter().filter_map(one).collect()
+}
+
 /// Everything that was found, as the answer.
 pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeReport {
     let accepted: Vec<&Accepted> = weighed.accepted.iter().collect();
@@ -251,25 +305,7 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
     let verdict = super::super::report::verdict(weighed.none, accepted.len(), weighed.last_none < NAMED);
     let places = if verdict == Verdict::Consistent { Vec::new() } else { places(cells) };
     let noise = cells.spread;
-    let mut sum = 0.0;
-    let set = weighed.probabilities.iter().take_while(|(_, p)| {
-        let begun = sum < SET;
-        sum += p;
-        begun
-    });
-    let open = |f: &&Fit| !accepted.iter().any(|a| a.fit.change == f.change);
-    let p_of = |name: &str| weighed.probabilities.iter().find(|(n, _)| n == name).map_or(0.0, |(_, p)| *p);
-    let share = ((1.0 - prior) / weighed.alone.len().max(1) as f64).max(1e-6);
-    let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
-    let mut not = vec![];
-    if cells.ramps > 0.0 {
-        not.push(NotComparable::Ramps { share: cells.ramps });
-    }
-    if cells.unmatched > 0 {
-        not.push(NotComparable::States {
-            share: cells.unmatched as f64 / (cells.unmatched + cells.cells.len()) as f64,
-        });
-    }
+    let probability = |(cause, p): &(String, f64)| Probability { cause: cause.clone(), probability: *p };
     ChangeReport {
         muscle: None,
         samples: 0,
@@ -287,28 +323,9 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
             share_where_shown: where_shown.share(),
             noise_N: noise,
         },
-        considered: weighed
-            .alone
-            .iter()
-            .filter(open)
-            .map(|f| {
-                let p = p_of(f.change.name());
-                let (_, unit, _, std) = f.parameters.first().copied().unwrap_or(("", "", 0.0, 0.0));
-                Considered {
-                    effect: f.change.name().into(),
-                    gain: p,
-                    why_not: WhyNot::of(true, p),
-                    detectable: Some(std * z).filter(|d| *d > 0.0 && d.is_finite()),
-                    unit: unit.into(),
-                }
-            })
-            .collect(),
-        set: set.map(|(n, _)| n.clone()).collect(),
-        probabilities: weighed
-            .probabilities
-            .iter()
-            .map(|(cause, p)| Probability { cause: cause.clone(), probability: *p })
-            .collect(),
+        considered: considered(weighed, prior),
+        set: set(weighed),
+        probabilities: weighed.probabilities.iter().map(probability).collect(),
         remarks: remarks(cells),
         reference: Reference {
             files: Vec::new(),
@@ -317,16 +334,9 @@ pub(super) fn answer(cells: &Cells, weighed: &Weighed, prior: f64) -> ChangeRepo
             repeatability_N: noise,
             repeatability_from: Repeatability::Measured,
             mounted_anew: true,
-            not_comparable: not,
+            not_comparable: not_comparable(cells),
         },
-        alone: weighed
-            .alone
-            .iter()
-            .filter_map(|f| {
-                let (name, unit, value, std) = f.parameters.first()?;
-                Some((f.change.name().to_owned(), size((name, unit), *value, *std, 1e6, CATALOGUE_LAW_ERROR)))
-            })
-            .collect(),
+        alone: alone(weighed),
         curves: curves(cells, &weighed.accepted),
         abscissa: ("displacement", "mm"),
     }

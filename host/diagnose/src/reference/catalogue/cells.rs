@@ -225,13 +225,20 @@ fn linearised(joint: &Rows, own: &Rows, first_after: usize, place: &[usize]) -> 
     own.with_contexts(contexts)
 }
 
-impl Cells {
-    /// Compares two campaigns.
-    ///
-    /// # Errors
-    /// Recordings without force, or campaigns that have too little in common.
-    pub fn of(before: &Campaign, after: &Campaign, braid: &Braid<f64>) -> Result<Self> {
-        let (own, _) = rows::prepare(after, braid)?;
+/// Rows of both campaigns under the model that was fitted to BEFORE.
+struct Joint {
+    rows: Rows,
+    /// Measured less modelled force, N.
+    residual: Vec<f64>,
+    /// The first row of AFTER, and its recording.
+    first_after: usize,
+    first_recording: u32,
+    /// Share of rows on ramps of pressure at a held length.
+    ramps: f64,
+}
+
+impl Joint {
+    fn of(before: &Campaign, after: &Campaign, braid: &Braid<f64>, own: &Rows) -> Result<Self> {
         let recordings = before.recordings.iter().chain(&after.recordings).cloned().collect();
         let both = Campaign { recordings, clock: Clock::Separate, warnings: Vec::new() };
         let (prepared, _) = rows::prepare(&both, braid)?;
@@ -249,86 +256,143 @@ impl Cells {
         }
         let residual = fitted.raw_residual.clone();
         let (joint, _) = baselines::without_slack(&joint, &fitted);
-        let joint = baselines::linearised(&joint, &fitted);
-        let states = States::of(&joint, first_after);
-        let old = gathered(&joint, &states, 0..first_after);
-        let level = Level::of(&old, &residual);
-        let variance = level.variance;
-        let forces = joint.force[..first_after].iter();
-        let largest = forces.copied().fold(0.0, f64::max);
-        let floor = (CATALOGUE_FLOOR * largest).powi(2);
-        let new = gathered(&joint, &states, first_after..joint.len());
+        let rows = baselines::linearised(&joint, &fitted);
+        Ok(Self { rows, residual, first_after, first_recording, ramps })
+    }
+
+    /// Largest force before, N.
+    fn largest(&self) -> f64 {
+        self.rows.force[..self.first_after].iter().copied().fold(0.0, f64::max)
+    }
+}
+
+/// The cells of AFTER that BEFORE has a state of, with a number for each.
+#[derive(Default)]
+struct Matched {
+    cells: Vec<Cell>,
+    /// N.
+    difference: Vec<f64>,
+    /// N².
+    variance: Vec<f64>,
+    /// Half the hysteresis of the model, N.
+    half_gap: Vec<f64>,
+    /// Cells of AFTER that BEFORE has nothing of.
+    unmatched: usize,
+}
+
+impl Matched {
+    /// Compares the states of AFTER with those of BEFORE. `place` is the row of `rows` for each joint row of AFTER; `floor` is the
+    /// least variance, N².
+    fn of(
+        joint: &Joint,
+        states: &States,
+        level: &Level,
+        (rows, place): (&Rows, &[usize]),
+        floor: f64,
+    ) -> Self {
+        let (all, first_after) = (&joint.rows, joint.first_after);
+        let new = gathered(all, states, first_after..all.len());
         let mut shared: BTreeMap<Key, f64> = BTreeMap::new();
         new.keys().for_each(|(_, key)| *shared.entry(*key).or_insert(0.0) += 1.0);
-        let place = matched(&joint, &own, first_after, first_recording);
-        let rows = linearised(&joint, &own, first_after, &place);
         let begin = rows.contexts().first().map_or(0.0, |c| c.time);
-        let end = rows.contexts().last().map_or(1.0, |c| c.time);
-        let (mut cells, mut difference, mut spread, mut unmatched) = (Vec::new(), Vec::new(), Vec::new(), 0);
-        let rest = rests::numbers(&joint);
-        let mut half_gap = Vec::new();
+        let rest = rests::numbers(all);
+        let mut found = Self::default();
         for ((_, key), members) in &new {
             let Some((before, count)) = level.means.get(key) else {
-                unmatched += 1;
+                found.unmatched += 1;
                 continue;
             };
             let own_rows: Vec<usize> = members.iter().map(|j| place[j - first_after]).collect();
             let first = members.first().copied().unwrap_or(first_after);
-            let d = mean(&residual, members) - before;
+            let d = mean(&joint.residual, members) - before;
             if !d.is_finite() {
                 continue;
             }
-            difference.push(d);
+            found.difference.push(d);
             // Cells of AFTER share the mean of BEFORE: each counts with its part of that mean's error.
-            let own = level.variances.get(&key.3).copied().unwrap_or(variance);
-            spread.push((own + floor) * (1.0 + shared.get(key).copied().unwrap_or(1.0) / count));
-            let friction = |j: &usize| joint.contexts()[*j].friction * joint.contexts()[*j].quasi;
-            half_gap.push(members.iter().map(friction).sum::<f64>().abs() / members.len().max(1) as f64);
-            cells.push(Cell {
+            let own = level.variances.get(&key.3).copied().unwrap_or(level.variance);
+            found.variance.push((own + floor) * (1.0 + shared.get(key).copied().unwrap_or(1.0) / count));
+            let friction = |j: &usize| all.contexts()[*j].friction * all.contexts()[*j].quasi;
+            let gap = members.iter().map(friction).sum::<f64>().abs() / members.len().max(1) as f64;
+            found.half_gap.push(gap);
+            found.cells.push(Cell {
                 rest: rest[first],
                 key: *key,
-                recording: (joint.recording[first] - first_recording) as usize,
+                recording: (all.recording[first] - joint.first_recording) as usize,
                 time: rows.contexts()[own_rows[0]].time - begin,
-                force: mean(&joint.force, members),
-                stroke: joint.contexts()[first].stroke,
-                direction: joint.sign[first],
+                force: mean(&all.force, members),
+                stroke: all.contexts()[first].stroke,
+                direction: all.sign[first],
                 rows: own_rows,
             });
         }
-        if cells.len() < CATALOGUE_FEWEST_CELLS || !(largest > 0.0) {
+        found
+    }
+
+    /// Widens the errors of rests in which friction slipped in one of the campaigns; gives the number of such rests.
+    fn widen_slipped(&mut self) -> usize {
+        let slipped = rests::slipped(&self.cells, &self.difference, &self.variance, &self.half_gap);
+        for i in (0..self.cells.len()).filter(|i| slipped[*i]) {
+            self.variance[i] += (2.0 * self.half_gap[i]).powi(2);
+        }
+        let mut rests: Vec<usize> =
+            self.cells.iter().zip(&slipped).filter(|(_, s)| **s).map(|(c, _)| c.rest).collect();
+        rests.sort_unstable();
+        rests.dedup();
+        rests.len()
+    }
+
+    /// Which state each cell is of, and the number of states.
+    fn groups(&self) -> (Vec<usize>, usize) {
+        let mut states: Vec<Key> = self.cells.iter().map(|c| c.key).collect();
+        states.sort_unstable();
+        states.dedup();
+        (self.cells.iter().map(|c| states.binary_search(&c.key).unwrap_or(0)).collect(), states.len())
+    }
+}
+
+impl Cells {
+    /// Compares two campaigns.
+    ///
+    /// # Errors
+    /// Recordings without force, or campaigns that have too little in common.
+    pub fn of(before: &Campaign, after: &Campaign, braid: &Braid<f64>) -> Result<Self> {
+        let (own, _) = rows::prepare(after, braid)?;
+        let joint = Joint::of(before, after, braid, &own)?;
+        let first_after = joint.first_after;
+        let states = States::of(&joint.rows, first_after);
+        let level = Level::of(&gathered(&joint.rows, &states, 0..first_after), &joint.residual);
+        let largest = joint.largest();
+        let floor = (CATALOGUE_FLOOR * largest).powi(2);
+        let place = matched(&joint.rows, &own, first_after, joint.first_recording);
+        let rows = linearised(&joint.rows, &own, first_after, &place);
+        let begin = rows.contexts().first().map_or(0.0, |c| c.time);
+        let end = rows.contexts().last().map_or(1.0, |c| c.time);
+        let mut found = Matched::of(&joint, &states, &level, (&rows, &place), floor);
+        if found.cells.len() < CATALOGUE_FEWEST_CELLS || !(largest > 0.0) {
             return Err(Error::new(
                 DataCode::RecordingOutOfRange,
                 "AFTER and the reference have too little in common: no strokes at the same pressures and lengths",
             )
             .help("record the same pressures over the same stroke"));
         }
-        let slipped = rests::slipped(&cells, &difference, &spread, &half_gap);
-        for i in (0..cells.len()).filter(|i| slipped[*i]) {
-            spread[i] += (2.0 * half_gap[i]).powi(2);
-        }
-        let mut rests: Vec<usize> =
-            cells.iter().zip(&slipped).filter(|(_, s)| **s).map(|(c, _)| c.rest).collect();
-        rests.sort_unstable();
-        rests.dedup();
-        let mut states: Vec<Key> = cells.iter().map(|c| c.key).collect();
-        states.sort_unstable();
-        states.dedup();
-        let group = cells.iter().map(|c| states.binary_search(&c.key).unwrap_or(0)).collect();
+        let slipped = found.widen_slipped();
+        let (group, groups) = found.groups();
         Ok(Self {
             group,
-            groups: states.len(),
-            difference: DVector::from_vec(difference),
-            variance: DVector::from_vec(spread),
+            groups,
+            difference: DVector::from_vec(found.difference),
+            variance: DVector::from_vec(found.variance),
             rows,
             largest,
-            spread: (variance + floor).sqrt(),
-            levels: joint.levels.clone(),
-            unmatched,
-            slipped: rests.len(),
-            ramps,
+            spread: (level.variance + floor).sqrt(),
+            levels: joint.rows.levels.clone(),
+            unmatched: found.unmatched,
+            slipped,
+            ramps: joint.ramps,
             names: own.names.clone(),
             duration: (end - begin).max(1e-9),
-            cells,
+            cells: found.cells,
         })
     }
 

@@ -1,6 +1,8 @@
 //! A gear behind the muscle runs unevenly: `F_add = a sin(2π x/λ)`.
 
-use model_core::effects::{Context, Effect, Experiment, Info, Link, Memory, Parameter, Start, Traits};
+use model_core::effects::{
+    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+};
 use model_core::scalar::Scalar;
 
 /// See the [module](self).
@@ -24,7 +26,11 @@ impl Effect for StrokeRipple {
         source: "made for this test",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops);
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops).changed(Changed::new(
+        Class::Alone(Self::INFO.name),
+        Owner::Rig,
+        "a gear runs unevenly",
+    ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let phase = context.stroke / parameters[1] * T::from_f64(std::f64::consts::TAU);

@@ -3,8 +3,6 @@
 //! namesake there leaves in the force once a base model has taken its part. Laws that only describe themselves would pass every
 //! other test.
 
-mod bench_campaign;
-
 use std::collections::BTreeMap;
 
 use model_core::effects::{Context, MEMORY};
@@ -26,6 +24,8 @@ use virtual_bench::pneumatics::Pneumatics;
 use virtual_bench::presets;
 use virtual_bench::protocol::{Protocol, Step};
 use virtual_bench::sensors::Sensor;
+
+use crate::bench_campaign;
 
 /// What of an effect's trace, beyond the base model's reach, its namesake must at least explain.
 const BOUNDS: [(&str, f64); 28] = [

@@ -9,7 +9,7 @@ use serde_json::Value;
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
 
-mod bench_campaign;
+use crate::bench_campaign;
 
 fn history(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     let out = Command::new(env!("CARGO_BIN_EXE_host"))

@@ -11,9 +11,9 @@ use pam_fit::{Fit, Options, fit};
 use proptest::prelude::*;
 use virtual_bench::presets;
 
-mod bench_campaign;
-
 use bench_campaign::{description, files, thesis};
+
+use crate::bench_campaign;
 
 /// The table's numbers agree to `share` of their size, the errors to ten times that: a last digit that rounds the other way puts a
 /// point into the neighbouring chunk, which errors feel and the table does not.

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-mod bench_campaign;
-
 use std::path::Path;
 use std::process::Command;
 
@@ -16,6 +14,8 @@ use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};
 use virtual_bench::presets;
+
+use crate::bench_campaign;
 
 /// Pressure staircases at three held lengths; the stroke is the nominal one, as on a bench without a displacement sensor.
 fn staircases(spec: &MuscleSpec, seed: u64) -> Campaign {

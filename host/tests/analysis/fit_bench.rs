@@ -8,9 +8,9 @@ use virtual_bench::muscle::Muscle;
 use virtual_bench::presets;
 use virtual_bench::rng::Rng;
 
-mod bench_campaign;
-
 use bench_campaign::{description, thesis};
+
+use crate::bench_campaign;
 
 /// The three muscles of the thesis: errors, P0 and k_F against the truth, with bounds on both sides so that a change for the
 /// better is noticed too.

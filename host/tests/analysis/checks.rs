@@ -1,7 +1,5 @@
 //! Checks of the bench: what dead weights, a rigid bar and a reference gauge tell, and what a diagnosis makes of it.
 
-mod bench_campaign;
-
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -16,6 +14,8 @@ use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::checks::all;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::{campaigns, presets};
+
+use crate::bench_campaign;
 
 fn bench() -> BenchSpec {
     BenchSpec::laboratory(presets::by_name("mini").expect("a preset"), 5)

@@ -1,0 +1,80 @@
+//! Amplitudes with signs, from products of few columns.
+
+use crate::criteria::candidates::MOST_AMPLITUDES;
+
+/// Which signs an amplitude may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sign {
+    /// Either.
+    Free,
+    /// Zero or more.
+    Positive,
+    /// Zero or less.
+    Negative,
+}
+
+/// Amplitudes of few columns `z` against `r` by least squares under sign constraints, and the energy they remove.
+///
+/// All subsets of up to `most` columns are tried (there are few), so the constrained optimum is exact.
+pub(crate) fn amplitudes(gram: &[Vec<f64>], moment: &[f64], signs: &[Sign], most: u32) -> (Vec<f64>, f64) {
+    let n = moment.len();
+    let mut best = (vec![0.0; n], 0.0);
+    for subset in (1_u32..(1 << n.min(MOST_AMPLITUDES as usize))).filter(|s| s.count_ones() <= most) {
+        let chosen: Vec<usize> = (0..n).filter(|i| subset & (1 << i) != 0).collect();
+        let Some(solution) = solve_symmetric(gram, moment, &chosen) else { continue };
+        let allowed = chosen.iter().zip(&solution).all(|(i, a)| match signs[*i] {
+            Sign::Free => true,
+            Sign::Positive => *a >= 0.0,
+            Sign::Negative => *a <= 0.0,
+        });
+        let gain: f64 = chosen.iter().zip(&solution).map(|(i, a)| a * moment[*i]).sum();
+        if allowed && gain > best.1 {
+            let mut full = vec![0.0; n];
+            for (i, a) in chosen.iter().zip(solution) {
+                full[*i] = a;
+            }
+            best = (full, gain);
+        }
+    }
+    best
+}
+
+/// Solves the sub-system of `chosen` unknowns by Cholesky; `None` where it is singular.
+pub(crate) fn solve_symmetric(gram: &[Vec<f64>], moment: &[f64], chosen: &[usize]) -> Option<Vec<f64>> {
+    let n = chosen.len();
+    let scale: Vec<f64> = chosen.iter().map(|i| gram[*i][*i].sqrt()).collect();
+    if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
+        return None;
+    }
+    let mut l = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let mut v = gram[chosen[i]][chosen[j]] / (scale[i] * scale[j]);
+            for k in 0..j {
+                v -= l[i][k] * l[j][k];
+            }
+            if i == j {
+                if v <= 1e-10 {
+                    return None;
+                }
+                l[i][i] = v.sqrt();
+            } else {
+                l[i][j] = v / l[j][j];
+            }
+        }
+    }
+    let mut x: Vec<f64> = chosen.iter().zip(&scale).map(|(i, s)| moment[*i] / s).collect();
+    for i in 0..n {
+        for k in 0..i {
+            x[i] -= l[i][k] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    for i in (0..n).rev() {
+        for k in i + 1..n {
+            x[i] -= l[k][i] * x[k];
+        }
+        x[i] /= l[i][i];
+    }
+    Some(x.iter().zip(&scale).map(|(v, s)| v / s).collect())
+}
