@@ -34,7 +34,7 @@ impl Read for Received {
     }
 }
 
-/// Bytes that have been sent; the port is gone after so many writes.
+/// Bytes that have been sent; the port is gone after n writes.
 struct Sent(Vec<u8>, usize);
 
 impl ErrorType for Sent {
@@ -66,7 +66,7 @@ fn frames(bytes: &[u8]) -> Vec<(Kind, u16)> {
     found
 }
 
-/// The answers to a status, a restart and a status, on a line that takes so many writes.
+/// The answers to a status, a restart and a status, on a line that takes n writes.
 fn answers(writes: usize) -> Vec<(Kind, u16)> {
     let shared = Shared::new(Settings::default());
     let identity = Identity {

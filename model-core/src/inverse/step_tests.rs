@@ -1,4 +1,4 @@
-//! How many steps a search takes, where it turns back, and what it says of where it ended.
+//! How many steps a search takes, which steps it refuses, and what it reports of its end.
 
 use super::*;
 use crate::effects::{EffectName, FittedEffect};
@@ -105,7 +105,7 @@ fn a_search_that_has_not_ended_after_its_most_steps_does_not_claim_an_answer() {
     assert_ne!(found.reach, Reach::Reached);
 }
 
-/// A root, on which Newton's method goes back and forth between two pressures for ever.
+/// A root, on which Newton's method goes back and forth between two pressures without end.
 struct Root;
 
 impl Curve<f64> for Root {
