@@ -371,7 +371,7 @@ mod tests {
         let mut bytes = example().to_bytes().expect("valid");
         bytes[4] = 7;
         let text = TableFile::from_bytes(&bytes).expect_err("another version").to_string();
-        assert!(text.contains("format 7") && text.contains(&format!("format {VERSION}")), "{text}");
+        assert!(text.contains("format 7") && text.contains(&format!("and {VERSION}")), "{text}");
     }
 
     proptest! {

@@ -1,7 +1,7 @@
 //! The time before recordings at held lengths, as memories of the load see it.
 //!
 //! Between two recordings the muscle is vented in [`VENTING`] seconds, rests without pressure, and is filled from there to the first
-//! reading. Where it was mounted anew in between, it may have carried a load that nobody recorded ([`EarlierLoad`]). Recordings
+//! reading. Where it was mounted anew in between, it may have carried a load without a recording ([`EarlierLoad`]). Recordings
 //! in motion say nothing about the time between them.
 
 use model_core::effects::{Context, EffectName, FittedEffect};
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::{Preceding, Rest, VENTING};
 
-/// A load that nobody recorded: before the first recording of each mounting that follows another, the muscle was filled at that length.
+/// A load without a recording: before the first recording of each mounting that follows another, the muscle was filled at that length.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct EarlierLoad {
     /// To this pressure, Pa.

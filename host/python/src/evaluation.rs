@@ -16,7 +16,7 @@ use crate::muscle::Muscle;
 #[derive(Serialize)]
 #[allow(non_snake_case, reason = "names carry their unit")]
 struct HeldOut<'a> {
-    rows: usize,
+    rows: f64,
     mean_N: f64,
     rms_N: f64,
     bias_N: f64,

@@ -32,7 +32,7 @@ impl Client {
     /// Sends a setpoint for the mode that this session has started.
     ///
     /// # Errors
-    /// As [`Self::call`]; [`DeviceCode::DeviceInUse`] when another session started the mode.
+    /// As [`Self::call`]; [`DeviceCode::DeviceInUse`](crate::error::DeviceCode::DeviceInUse) when another session started the mode.
     pub fn set_point(&mut self, set_point: SetPoint) -> Result<Status> {
         self.call::<SetTo>(&SetPointOrder { set_point, session: self.session })
     }
@@ -49,7 +49,7 @@ impl Client {
     /// A session that only reads sends nothing, so it never keeps the run of another program alive.
     ///
     /// # Errors
-    /// [`DeviceCode::DeviceSilent`] when the line is gone; once, [`DeviceCode::DeviceInUse`] when another session has taken over.
+    /// [`DeviceCode::DeviceSilent`](crate::error::DeviceCode::DeviceSilent) when the line is gone; once, [`DeviceCode::DeviceInUse`](crate::error::DeviceCode::DeviceInUse) when another session has taken over.
     pub fn keep_alive(&mut self) -> Result<()> {
         if let Some(refusal) = self.displaced.take() {
             self.controls = false;

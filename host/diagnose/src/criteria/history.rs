@@ -137,7 +137,7 @@ pam_data::criteria! {
     /// Most rounds of a table's fit: friction and the wall's drive come from the last round.
     TABLE_ROUNDS: usize = 40, "n_round", "1", Cost;
     /// The rounds end when the layers of the table differ from those it was fitted with by less than this share of the largest force.
-    TABLE_SETTLED: f64 = 2e-4, "δ_round", "1", Derived("what is left is then below the noise of the readings");
+    TABLE_SETTLED: f64 = 2e-4, "δ_round", "1", Derived("the remaining difference is below the noise of the readings");
     /// Least number of slack points whose median is the zero of the load cell.
     TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
     /// Nodes of a table of held lengths over the pressures that pull.

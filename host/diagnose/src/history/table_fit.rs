@@ -188,7 +188,7 @@ impl<'a> Prepared<'a> {
         {
             best = found;
         }
-        // Last, as nobody observed it: what the recordings show comes first.
+        // Last, as no recording shows it: effects that the recordings show come first.
         if memory {
             best = self.with_earlier_load(&problem, best)?;
         }
