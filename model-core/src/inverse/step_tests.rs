@@ -130,6 +130,28 @@ fn a_step_back_to_a_pressure_that_was_tried_is_not_taken() {
     }
 }
 
+/// A force that rises from the middle on.
+struct Flat;
+
+impl Curve<f64> for Flat {
+    fn enter(&mut self, _: f64) {}
+
+    fn holds(&self, _: f64) -> bool {
+        true
+    }
+
+    fn force_and_slope(&mut self, p: f64) -> (f64, f64) {
+        if p < 0.5 { (0.0, 0.0) } else { (p - 0.5, 1.0) }
+    }
+}
+
+#[test]
+fn where_nothing_is_missed_on_a_flat_part_the_search_continues_upwards() {
+    let [low, high, tolerance] = [0.0, 1.0, 1e-9].map(Pressure::from_pascals);
+    let found = solve(&mut Flat, 0.0, Pressure::from_pascals(0.25), &Search { low, high, tolerance });
+    assert_eq!((found.pressure.pascals(), found.reach), (0.5, Reach::Reached));
+}
+
 #[test]
 fn no_piece_is_assumed_where_effects_may_bend_the_force() {
     let m = muscle();
