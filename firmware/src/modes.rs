@@ -404,3 +404,6 @@ pub fn stroke_force(
     integral.step(stroke_loop.integral_n_per_m_s * error, stroke_loop.force_limit_n, saturation);
     limited
 }
+
+#[cfg(test)]
+mod tests;

@@ -111,7 +111,7 @@ impl<F: NorFlash> Server<F> {
     }
 
     /// The device restarts: see [`Update::restarted`].
-    #[cfg(feature = "std")]
+    #[cfg(any(test, feature = "std"))]
     pub fn boot(&mut self) {
         if let Some(update) = &mut self.update {
             update.restarted();

@@ -369,4 +369,6 @@ pub(crate) mod mock_flash;
 #[cfg(test)]
 mod protection_tests;
 #[cfg(test)]
+mod side_tests;
+#[cfg(test)]
 mod tests;

@@ -60,3 +60,6 @@ pub async fn telemetry<W: Write>(sender: &Gate<CriticalSectionRawMutex, W>, shar
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

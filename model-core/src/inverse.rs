@@ -378,4 +378,6 @@ impl<T: Scalar> Muscle<T> {
 }
 
 #[cfg(test)]
+mod step_tests;
+#[cfg(test)]
 mod tests;

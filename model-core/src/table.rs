@@ -353,4 +353,17 @@ mod tests {
         assert_eq!(wrong(|t| t.tested.contraction_high = f32::NAN), Err(TableError::Tested));
         assert_eq!(example().order(), 4);
     }
+
+    #[test]
+    fn the_curves_of_the_example_rise_evenly_between_their_ends() {
+        let ends = [[2.1e6, 2.6e6], [-1.5e6, -2.2e6], [1.1e6, 1.6e6], [-0.2e6, -0.4e6]];
+        let t = example();
+        for (curve, [low, high]) in t.elastic.iter().zip(ends) {
+            let span = t.nodes[5] - t.nodes[0];
+            for (value, node) in curve.iter().zip(&t.nodes) {
+                let part = (node - 207e3) / span;
+                assert!((value - (low * (1.0 - part) + high * part)).abs() < 1.0, "{value} at {node}");
+            }
+        }
+    }
 }

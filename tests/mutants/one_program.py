@@ -5,7 +5,8 @@ Building the tests anew for each of a thousand changes takes hours. Here every f
     fn halved(x: f32) -> f32 { match crate::change_in_force() { 1 => { x * 2.0 } 2 => { x % 2.0 } _ => { x / 2.0 } } }
 
 The program is built once and runs once for each change. A change that does not compile is found by the place of the compiler's message
-and left out. Functions that are evaluated while compiling cannot choose; their changes are built one by one.
+and left out. Functions that are evaluated while compiling cannot choose; their changes are built one by one. A `const fn` loses its
+`const` if no constant needs it.
 """
 
 import json
@@ -48,7 +49,8 @@ def listed(root):
 class Source:
     """The text of a file, in which cargo-mutants counts lines and columns from 1."""
 
-    def __init__(self, text):
+    def __init__(self, text, constant=()):
+        self.constant = constant
         # Copies of copies, if functions with changes were inlined into each other, would keep the compiler busy for hours.
         self.text = INLINE.sub(lambda found: " " * len(found[0]), text)
         self.code = NO_CODE.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
@@ -61,18 +63,23 @@ class Source:
         return self.at(of["start"]), self.at(of["end"])
 
     def body(self, function):
-        """Where a function begins, and where its body begins and ends, without its braces; none where it is evaluated while compiling."""
+        """Where a function begins, its `const` if it has one, and where its body begins and ends, without its braces; none where it is
+        evaluated while compiling."""
         begin, end = self.span(function["span"])
         name = function["function_name"].split("::")[-1].split("<")[0]
         head = re.compile(rf"\bfn\s+{re.escape(name)}\b").search(self.code, begin, end)
-        if not head or re.search(r"\bconst\s+(unsafe\s+)?$", self.code[begin:head.start()]):
+        if not head:
             return None
+        const = re.search(r"\bconst\s+(?=(unsafe\s+)?$)", self.code[begin:head.start()])
+        if const and name in self.constant:
+            return None
+        const = (begin + const.start(), begin + const.end()) if const else (begin, begin)
         depth = 0
         for at in range(head.end(), end):
             depth += self.code[at] in "(["
             depth -= self.code[at] in ")]"
             if self.code[at] == "{" and depth == 0:
-                return begin, at + 1, self.code.rindex("}", at, end)
+                return begin, at + 1, self.code.rindex("}", at, end), const
         return None
 
     def changed(self, mutant, within):
@@ -104,8 +111,8 @@ def assembled(source, mutants):
         if number is not None:
             lines[number] = (first, line)
 
-    for (head, begin, end), here in sorted(bodies.items()):
-        add(source.text[last:head] + "#[inline(never)] " + source.text[head:begin] + "\nmatch crate::change_in_force() {\n")
+    for (head, begin, end, const), here in sorted(bodies.items()):
+        add(source.text[last:head] + "#[inline(never)] " + source.text[head:const[0]] + source.text[const[1]:begin] + "\nmatch crate::change_in_force() {\n")
         for mutant in here:
             add(f"{mutant['id']} => {{{source.changed(mutant, (begin, end))}}}", mutant["id"])
             add("\n")
@@ -126,6 +133,8 @@ class Program:
         }
         self.mutants = mutants
         self.not_built, self.alone, self.tests = set(), [], {}
+        # Names of functions that constants need.
+        self.constant = set()
 
     def build(self):
         """Builds the program; what does not compile is left out and tried again without."""
@@ -139,7 +148,7 @@ class Program:
                 if wrong is None:
                     return
                 bad = {number for file, line in wrong for number, (first, last) in places.get(file, {}).items() if first <= line <= last}
-                if not bad:
+                if not bad and not self.needed:
                     sys.exit(f"the changed program cannot be built: {wrong[0][0][-2000:]}")
                 self.not_built |= bad
             sys.exit("the changed program cannot be built after 20 attempts")
@@ -151,7 +160,7 @@ class Program:
         self.alone, places = [], {}
         for file, text in originals.items():
             here = [one for one in self.mutants if one["file"] == file and one["id"] not in self.not_built]
-            changed, places[file], alone = assembled(Source(text), here)
+            changed, places[file], alone = assembled(Source(text, self.constant), here)
             self.alone += alone
             (self.place / file).write_text(changed + (CHOICE if file in roots else ""))
         return places
@@ -168,12 +177,16 @@ class Program:
                 self.tests[name].unlink(missing_ok=True)
                 shutil.copy(path, self.tests[name])
             return None
-        wrong, words = [], [run.stderr[-3000:]]
+        wrong, words, known = [], [run.stderr[-3000:]], set(self.constant)
         for one in messages:
             if one["reason"] == "compiler-message" and one["message"]["level"] == "error":
                 spans = one["message"]["spans"]
+                if (one["message"]["code"] or {}).get("code") == "E0015":
+                    needs = re.search(r"`([^`]*)`", one["message"]["message"])
+                    self.constant |= {needs[1].split("::")[-1].split("<")[0]} if needs else set()
                 words.append(one["message"]["rendered"])
                 wrong += [(span["file_name"], span["line_start"]) for span in spans if span["is_primary"]]
+        self.needed = self.constant - known
         return wrong or [("".join(words), 0)]
 
     def outcome(self, number, file):

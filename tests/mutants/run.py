@@ -32,6 +32,11 @@ def copied():
         if not copy.exists() or copy.read_bytes() != source.read_bytes():
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(source, copy)
+    # What has been moved or removed since: cargo would find its tests twice. The programs of an earlier run stay.
+    tracked = {place / name.decode() for name in files}
+    for path in place.rglob("*"):
+        if path.is_file() and path not in tracked and not path.name.endswith("-tests"):
+            path.unlink()
     return place
 
 

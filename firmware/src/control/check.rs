@@ -248,6 +248,8 @@ fn watch(settings: &Settings, hardware: &Hardware) -> bool {
 }
 
 #[cfg(test)]
+mod range_tests;
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::board::Span;

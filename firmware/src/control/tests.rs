@@ -7,6 +7,7 @@ use super::Controller;
 use crate::board::{Inputs, Outputs, Readings, Signals};
 use crate::watch::Finding;
 
+mod bounds;
 mod comparison;
 mod exact;
 mod inputs;

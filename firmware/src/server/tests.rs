@@ -11,6 +11,7 @@ use model_core::units::Pressure;
 
 mod answered;
 mod bus;
+mod keeping;
 mod protection;
 
 use super::answers::Answers;

@@ -66,6 +66,17 @@ mod tests {
     }
 
     #[test]
+    fn ticks_that_begin_anew_do_not_take_the_allowance_away() {
+        let minutes = |count: u64| count * u64::from(REFILL_TICKS);
+        let mut wear = Wear::default();
+        let used = minutes(1_000);
+        assert_eq!((used..used + 100).filter(|tick| wear.allows(*tick)).count(), usize::from(BURST));
+        // The controller is restarted: a restart gives nothing, and a minute after it one write.
+        let found = [5, minutes(1) + 4, minutes(1) + 5, minutes(1) + 6].map(|tick| wear.allows(tick));
+        assert_eq!(found, [false, false, true, false]);
+    }
+
+    #[test]
     fn only_what_moved_is_written() {
         let memory = |value: f32| {
             let mut one = Memory::default();

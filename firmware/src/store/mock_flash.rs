@@ -47,6 +47,11 @@ impl MockFlash {
         self
     }
 
+    /// Words that were written, each erase of a page one of them.
+    pub(crate) fn words_written(&self) -> usize {
+        self.done
+    }
+
     /// Counts one operation; false when the power goes with it.
     fn spend(&mut self) -> bool {
         if self.left == 0 {

@@ -294,6 +294,7 @@ mod tests {
     fn the_longest_body_fits_and_one_byte_more_does_not() {
         let header = Header { kind: Kind::Topic, id: 1, sequence: 65535 };
         let mut wire = [0u8; MAX_WIRE];
+        let mut longest = 0;
         for fill in [0u8, 1, 255] {
             let body = [fill; MAX_BODY];
             let n = encode_bytes(header, &body, &mut wire).expect("the longest body fits");
@@ -308,7 +309,9 @@ mod tests {
                 }
             }
             assert_eq!(seen, 1);
+            longest = longest.max(n);
         }
+        assert_eq!(longest, MAX_WIRE, "and fills its room");
         assert_eq!(encode_bytes(header, &[1; MAX_BODY + 1], &mut wire), Err(FrameError::Space));
         assert_eq!(encode_bytes(header, &[1; 100], &mut [0; 60]), Err(FrameError::Space));
     }
@@ -328,6 +331,19 @@ mod tests {
             }
             assert_eq!(seen, Some(expected), "{length} bytes");
             assert_eq!(decode(&mut wire[..stuffed]).map(|frame| frame.body.len()), expected);
+        }
+    }
+
+    #[test]
+    fn fewer_bytes_than_a_header_and_a_check_sum_are_no_frame() {
+        for length in 0..HEADER + CHECK {
+            // With a check sum of their own where there is room for one.
+            let mut raw = vec![1; length.saturating_sub(CHECK)];
+            raw.extend_from_slice(&crc32(&raw).to_le_bytes());
+            raw.truncate(length);
+            let mut wire = [0; 32];
+            let stuffed = cobs::encode(&raw, &mut wire);
+            assert_eq!(decode(&mut wire[..stuffed]), Err(FrameError::TooShort), "{length} bytes");
         }
     }
 

@@ -138,6 +138,19 @@ impl Hello {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_board_keeps_its_number_and_its_name() {
+        let boards = [
+            (0, Board::Native, "native"),
+            (1, Board::Mps2An386, "mps2-an386"),
+            (2, Board::NucleoF446re, "nucleo-f446re"),
+        ];
+        for (code, board, name) in boards {
+            assert_eq!((Board::from_code(code), board as u8, board.name()), (Some(board), code, name));
+        }
+        assert_eq!(Board::from_code(3), None, "a board of a later version");
+    }
+
     /// If this test breaks, the layout of `hello` was changed, and every host in the field can no longer name what it
     /// met. Put the new field behind byte 44 instead.
     #[test]

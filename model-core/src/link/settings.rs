@@ -426,3 +426,6 @@ impl Default for Settings {
         Self::DEFAULT
     }
 }
+
+#[cfg(test)]
+mod tests;

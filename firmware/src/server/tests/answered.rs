@@ -100,8 +100,11 @@ fn faults_are_reported_and_cleared() {
     assert_eq!(answers.past_fault(&PastFault { back: 0 }, &mut past), Ok(()));
     assert_eq!(past.map(|report| report.fault), Some(Fault::OverForce), "kept before it is read");
     let mut status = Status::default();
+    assert_eq!(answers.status(&(), &mut status), Ok(()));
+    assert_eq!((status.state, status.fault), (State::Fault, Some(Fault::OverForce)));
     assert_eq!(answers.clear_fault(&(), &mut status), Ok(()));
     assert_eq!((status.state, status.fault), (State::Disarmed, None));
+    assert!(shared.with(|controller| controller.faults().latched.is_none()));
 }
 
 #[test]

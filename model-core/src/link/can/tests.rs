@@ -138,3 +138,30 @@ proptest! {
         prop_assert_eq!(later.last().copied(), Some((2, 10)));
     }
 }
+
+#[test]
+fn a_message_announces_from_one_byte_to_its_longest_and_is_as_long_as_they_need() {
+    let take = |payload: &[u8]| {
+        let mut receiver = Receiver::default();
+        let bytes: Vec<u8> = receiver.take(payload).collect();
+        (bytes, receiver.counts().malformed)
+    };
+    let mut longest = [9; 64];
+    longest[1] = 62;
+    assert_eq!(take(&[5, 2, 7, 8]), (vec![7, 8], 0));
+    assert_eq!(take(&longest), (vec![9; 62], 0));
+    let none = (Vec::new(), 1);
+    assert_eq!(take(&[5, 0]), none, "no byte");
+    assert_eq!(take(&[5, 2, 7, 8, 0]), none, "a byte more than they need");
+    assert_eq!(take(&[5, 3, 7, 8]), none, "a byte less");
+    longest[1] = 63;
+    assert_eq!(take(&longest), none, "more than a message carries");
+}
+
+#[test]
+fn an_address_is_a_number_from_one_to_eight() {
+    for number in 0..=u8::MAX {
+        let expected = (1..=8).contains(&number).then_some(number);
+        assert_eq!(Address::new(number).map(Address::number), expected);
+    }
+}

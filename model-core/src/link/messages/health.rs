@@ -116,3 +116,16 @@ fields!(HealthSums {
     sums,
     lagged
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_one_sum_for_each_pair_of_columns_and_three_for_each_shape_that_is_watched() {
+        let pairs = (0..COLUMNS).flat_map(|row| (row..COLUMNS).map(move |column| (row, column)));
+        assert_eq!((SHAPES, COLUMNS, pairs.count()), (10, 11, SUMS));
+        let watched = Shape::ALL.iter().filter(|shape| **shape != Shape::Drift).count();
+        assert_eq!((watched, 3 * 9 + 2), (WATCHED, LAGGED));
+    }
+}

@@ -1,0 +1,159 @@
+//! What a start finds and what is written to flash without a request: counted writes, kept memories, damaged tables.
+
+use model_core::effects::{EffectName, FittedEffect};
+use model_core::link::messages::{UpdatePiece, UpdateStatus};
+
+use super::*;
+
+/// A table with effects.
+fn with_effects(effects: &[(EffectName, &[f64])]) -> heapless::Vec<u8, { image::MAX_LEN }> {
+    let effects = effects.iter().map(|(effect, parameters)| FittedEffect::new(*effect, parameters)).collect();
+    let table = MuscleTable { effects, ..table::example() };
+    let mut bytes = [0; image::MAX_LEN];
+    let written = image::write(&table, &mut bytes).expect("a table");
+    heapless::Vec::from_slice(written).expect("it fits")
+}
+
+const MULLINS: (EffectName, &[f64]) = (EffectName::MullinsSoftening, &[0.4, 0.02, 0.1]);
+const COULOMB: (EffectName, &[f64]) = (EffectName::CoulombFriction, &[1.0, 1.0]);
+
+/// Words that are written while a server with a table keeps what it must some times, and each memory is moved in between by a part.
+fn words(image: &[u8], times: u32, part: f32) -> usize {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, image).is_ok());
+    pass(&shared, 10, &mut 0.0);
+    for time in 0..times {
+        shared.with(|controller| {
+            let Some(model) = controller.model_mut(Side::Agonist) else { return };
+            let moved = 0.01 * (1.0 + part * time as f32);
+            model.chain.restore(0, &[moved; model_core::effects::MEMORY]);
+        });
+        server.keep(&shared);
+    }
+    server.store.close().words_written()
+}
+
+#[test]
+fn memories_are_written_when_they_have_moved_and_only_where_one_must_last() {
+    let lasting = with_effects(&[MULLINS]);
+    let none = words(&lasting, 0, 0.0);
+    let once = words(&lasting, 1, 0.0);
+    assert!(once > none, "{once} words, {none} without keeping");
+    assert_eq!(words(&lasting, 6, 0.0), once, "nothing has moved");
+    assert_eq!(words(&lasting, 6, 1e-4), once, "hardly");
+    assert_eq!(words(&lasting, 6, 0.1) - none, 6 * (once - none), "each time");
+    let fleeting = with_effects(&[COULOMB]);
+    assert_eq!(words(&fleeting, 6, 0.1), words(&fleeting, 0, 0.0), "nothing that must last");
+    assert_eq!(words(&image(40.0), 6, 0.1), words(&image(40.0), 0, 0.0), "no effects");
+}
+
+#[test]
+fn the_memories_of_all_effects_are_kept_with_the_one_that_must_last() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &with_effects(&[COULOMB, MULLINS])).is_ok());
+    pass(&shared, 10, &mut 0.0);
+    server.keep(&shared);
+    let mut places = std::vec::Vec::new();
+    assert_eq!(server.store.each_memory(Side::Agonist, &mut |place, _| places.push(place)), Ok(2));
+    assert_eq!(places, [0, 1]);
+}
+
+#[test]
+fn a_table_that_cannot_be_read_at_a_start_is_not_used_and_latches_a_fault() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &image(40.0)).is_ok());
+    server.store.commit(Side::Agonist, &[1, 2, 3]).expect("room");
+    let shared = Shared::new(Settings::default());
+    let server = server.restarted(&shared).expect("a store");
+    assert_eq!(shared.with(|c| c.faults().latched.map(|report| report.fault)), Some(Fault::TableInvalid));
+    assert!(shared.with(|c| c.model(Side::Agonist).is_none()));
+    drop(server);
+}
+
+#[test]
+fn a_start_after_a_request_is_none_after_a_watchdog() {
+    let shared = Shared::new(Settings::default());
+    let identity = started(MockFlash::erased(), &shared).identity;
+    let watchdog = Identity { started_by: StartedBy::Watchdog, ..identity };
+    let server = Server::start(watchdog, MockFlash::erased(), &shared).expect("a store");
+    let shared = Shared::new(Settings::default());
+    let server = server.restarted(&shared).expect("a store");
+    assert_eq!(server.identity.started_by, StartedBy::Request);
+    assert_eq!((server.starts, shared.with(|c| c.faults().latched.is_none())), (2, true));
+}
+
+#[test]
+fn a_hello_is_answered_as_a_response_and_an_answer_not_at_all() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    for (kind, answered) in [(Kind::Request, true), (Kind::Response, false), (Kind::Topic, false)] {
+        let mut wire = [0; frame::MAX_WIRE];
+        let header = Header { kind, id: hello::ID, sequence: 9 };
+        let length = frame::encode(header, &(), &mut wire).expect("it fits");
+        let mut accumulator = frame::Accumulator::new();
+        for &byte in &wire[..length - 1] {
+            assert!(accumulator.push(byte).is_none());
+        }
+        let request = accumulator.push_to_answer(0).expect("a frame").expect("whole");
+        let written = server.handle(request, &shared).to_vec();
+        if !answered {
+            assert_eq!(written, [], "{kind:?}");
+            continue;
+        }
+        let mut answer = written[..written.len() - 1].to_vec();
+        let found = frame::decode(&mut answer).expect("an answer");
+        assert_eq!(found.header, Header { kind: Kind::Response, ..header });
+        let said = Hello::from_bytes(found.body).expect("a hello");
+        assert_eq!((said.starts, said.muscles, said.store_format), (1, 1, store::FORMAT));
+    }
+}
+
+/// Counts its restarts.
+struct Counted(std::sync::Arc<std::sync::atomic::AtomicU32>);
+
+impl Update for Counted {
+    fn status(&mut self, _: &mut UpdateStatus) -> Result<(), Refusal> {
+        Err(Refusal::NotSupported)
+    }
+
+    fn begin(&mut self, _: &[u8]) -> Result<(), Refusal> {
+        Err(Refusal::NotSupported)
+    }
+
+    fn piece(&mut self, _: &UpdatePiece) -> Result<u32, Refusal> {
+        Err(Refusal::NotSupported)
+    }
+
+    fn commit(&mut self) -> Result<(), Refusal> {
+        Err(Refusal::NotSupported)
+    }
+
+    fn confirm(&mut self) -> Result<(), Refusal> {
+        Err(Refusal::NotSupported)
+    }
+
+    fn revert(&mut self) -> Result<(), Refusal> {
+        Err(Refusal::NotSupported)
+    }
+
+    fn restarted(&mut self) {
+        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn a_restart_reaches_what_takes_another_firmware() {
+    let shared = Shared::new(Settings::default());
+    let count = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
+    let mut server = started(MockFlash::erased(), &shared);
+    server.boot();
+    server.take_updates(std::boxed::Box::new(Counted(count.clone())));
+    server.boot();
+    assert_eq!(count.load(std::sync::atomic::Ordering::Relaxed), 1);
+    // It stays with the server that starts again.
+    server.restarted(&shared).expect("a store").boot();
+    assert_eq!(count.load(std::sync::atomic::Ordering::Relaxed), 2);
+}
