@@ -73,7 +73,7 @@ def manifest(path, muscles):
 
 def dask(bin_, cores, fit_per, wall_per):
     """The section on the Dask job, which fits as many muscles as there are different ones."""
-    path = manifest("fleet.csv", 2 * RECORDED).resolve()
+    path = Path(manifest("fleet.csv", 2 * RECORDED)).resolve()
     _, _, _, text = timed([sys.executable, HERE / "fleet_dask.py", path, cores])
     muscles, wall, processor = (float(word) for word in text.split())
     lines = ["## Beside a Dask job that calls SciPy", "", "| program | muscles | wall per muscle | processor per muscle |", "| --- | ---: | ---: | ---: |"]
