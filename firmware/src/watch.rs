@@ -10,7 +10,7 @@
 //! | supply pressure low | `follow_ticks` below `supply_low_pa` |
 //! | enable open | `debounce_ticks` |
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
-//! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks` |
+//! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks`; a vented muscle whose pressure rises again, as when a person stretches it, has `vent_ticks` from then on |
 //! | hold ended | `hold_ticks` of a held command |
 //! | setpoint silence | `silence_ticks` without one |
 //! | host silence | `host_silence_ticks` without a whole frame, while running and not `autonomous` |
@@ -152,7 +152,7 @@ pub struct SideWatch {
     high: InARow,
     not_vented: InARow,
     second: InARow,
-    /// Ticks since the command is to vent.
+    /// Ticks for which the muscle has had time to vent: since the command is to vent and the pressure was at half of its limit or below.
     vented_ticks: u32,
     /// Ticks of the slice in which jumps are being counted, none before the first readings.
     slice: u8,
@@ -320,6 +320,11 @@ impl SideWatch {
     ) {
         let (watch, fitted) = (&settings.watch, settings.pressure.fitted);
         let gap = pressure - expected;
+        // The gas of a vented muscle that a person stretches is compressed for a moment: it gets as long to leave as after the command.
+        // Half of the limit, so that noise about the limit gives no new time.
+        if pressure <= 0.5 * watch.vented_pa {
+            self.vented_ticks = 0;
+        }
         let late = self.vented_ticks > watch.vent_ticks;
         let stands = fitted && late && pressure > watch.vented_pa;
         let (over, under) = (fitted && gap > watch.follow_pa, fitted && gap < -watch.follow_pa);

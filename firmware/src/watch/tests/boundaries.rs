@@ -154,6 +154,32 @@ fn a_muscle_is_not_vented_from_the_tick_after_its_time_on() {
 }
 
 #[test]
+fn a_vented_muscle_that_is_stretched_has_its_time_to_vent_again() {
+    let settings = wide();
+    let (time, vented) = (settings.watch.vent_ticks, settings.watch.vented_pa);
+    let seen = |pressure_pa: f32| Seen { command: Command::VENT, ..still(pressure_pa, 0.0, 0.0) };
+    let ticks = time as usize;
+    let after = |low: f32, high: usize| {
+        let rest = vec![seen(0.0); ticks + 10];
+        all([rest, vec![seen(low); 10], vec![seen(vented + 1.0); high]].concat(), &settings)
+    };
+    assert_eq!(after(0.0, ticks + 1), [], "a rise that is over in time");
+    let begun = time + 20;
+    for low in [0.0, 0.5 * vented] {
+        let (tick, finding) = after(low, ticks + 2)[0];
+        assert_eq!(
+            (tick, finding.fault),
+            (begun + time + 2, Fault::NotVented),
+            "a rise that stays, from {low}"
+        );
+    }
+    // Noise about the limit gives no new time.
+    let noisy: Vec<Seen> =
+        (0..2 * ticks).map(|tick| seen(if tick % 4 == 0 { 0.6 * vented } else { vented + 1.0 })).collect();
+    assert!(all(noisy, &settings)[0].0 <= time + 4);
+}
+
+#[test]
 fn a_restart_forgets_what_was_counted_but_not_how_long_the_muscle_has_been_vented() {
     let settings = wide();
     let over = still(settings.limits.pressure_pa + 1.0, 0.0, 0.0);
@@ -202,7 +228,8 @@ fn one_good_tick_begins_every_count_anew() {
     let follow = settings.watch.follow_pa;
     let apart = |miss: f32| Seen { expected_pa: 200e3, ..still(200e3 + miss, 0.0, 0.0) };
     let full = Seen { command: Command::VENT, ..still(settings.watch.vented_pa + 1.0, 0.0, 0.0) };
-    let empty = Seen { command: Command::VENT, ..still(0.0, 0.0, 0.0) };
+    // At the limit: no pressure from which the time would begin anew.
+    let empty = Seen { command: Command::VENT, ..still(settings.watch.vented_pa, 0.0, 0.0) };
     let good = still(200e3, 0.0, 0.0);
     let cases = [
         (Fault::OverPressure, still(limits.pressure_pa + 1.0, 0.0, 0.0), good),
@@ -267,7 +294,7 @@ fn two_watches_that_count_alike_are_both_reported_and_both_begin_anew_in_a_good_
         }
     }
     // Pressure in a vented muscle is more than the regulator's model says, too.
-    let empty = Seen { command: Command::VENT, ..still(0.0, 0.0, 0.0) };
+    let empty = Seen { command: Command::VENT, ..still(settings.watch.vented_pa, 0.0, 0.0) };
     let full = Seen { expected_pa: 0.0, command: Command::VENT, ..still(300e3, 0.0, 0.0) };
     assert!(300e3 > settings.watch.vented_pa && 300e3 > settings.watch.follow_pa);
     let before = vec![empty; settings.watch.vent_ticks as usize + 2];
