@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use pam_fleet::columns::Columns;
-use serde_json::Value;
+use serde_json::{Value, json};
 use virtual_bench::presets;
 use virtual_bench::recording::Columns as BenchColumns;
 use virtual_bench::rng::Rng;
@@ -28,7 +28,7 @@ fn host(folder: &Path, arguments: &[&str]) -> Output {
     output
 }
 
-fn json(output: &Output) -> Value {
+fn answer(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -105,7 +105,7 @@ fn a_killed_batch_continues_and_ends_with_the_same_bytes() {
     host(folder, &["batch", "fleet.csv", "-o", "whole", "--only", "fit", "--jobs", "1"]);
     let whole = start.elapsed();
     let mut rng = Rng::new(7);
-    let mut killed = 0;
+    let (mut killed, mut batches, mut kept) = (0, 1, 0);
     for round in 0..10 * kills {
         if killed == kills {
             break;
@@ -114,6 +114,7 @@ fn a_killed_batch_continues_and_ends_with_the_same_bytes() {
         if complete(&folder.join("killed")).len() as u64 == muscles {
             assert_eq!(tree(&folder.join("whole")), tree(&folder.join("killed")), "round {round}");
             fs::remove_dir_all(folder.join("killed")).unwrap();
+            batches += 1;
         }
         let before = complete(&folder.join("killed"));
         let mut child =
@@ -128,13 +129,20 @@ fn a_killed_batch_continues_and_ends_with_the_same_bytes() {
         killed += u64::from(!ended);
         let after = complete(&folder.join("killed"));
         assert!(before.iter().all(|(path, written)| after.get(path) == Some(written)), "computed twice");
+        kept += before.len();
     }
     assert!(killed >= kills.min(3), "only {killed} runs were interrupted");
     let before = complete(&folder.join("killed")).len() as u64;
-    let last = json(&host(folder, &["batch", "fleet.csv", "-o", "killed", "--only", "fit", "--json"]));
+    let last = answer(&host(folder, &["batch", "fleet.csv", "-o", "killed", "--only", "fit", "--json"]));
     assert_eq!(last["reused"].as_u64().unwrap(), before);
     assert_eq!(last["computed"].as_u64().unwrap(), muscles - before);
-    assert_eq!(tree(&folder.join("whole")), tree(&folder.join("killed")));
+    let bytes = tree(&folder.join("whole"));
+    assert_eq!(bytes, tree(&folder.join("killed")));
+    let files = bytes.len();
+    println!(
+        "figures: {}",
+        json!({"kills": killed, "batches": batches, "muscles": muscles, "kept": kept, "files": files})
+    );
 }
 
 /// The shards of a batch, computed one by one into one folder or several, are the whole batch.
@@ -148,7 +156,7 @@ fn shards_together_are_the_whole() {
     let mut sum = 0;
     for shard in ["1/3", "2/3", "3/3"] {
         let own = format!("s{}", &shard[..1]);
-        let said = json(&host(folder, &["batch", "fleet.csv", "-o", &own, "--shard", shard, "--json"]));
+        let said = answer(&host(folder, &["batch", "fleet.csv", "-o", &own, "--shard", shard, "--json"]));
         sum += said["muscles"].as_u64().unwrap();
         apart.extend(tree(&folder.join(&own)));
         host(folder, &["batch", "fleet.csv", "-o", "together", "--shard", shard, "--jobs", "3"]);
@@ -318,7 +326,7 @@ fn a_spoiled_muscle_is_a_failure_and_the_others_are_untouched() {
         manifest += &format!("{},{rest}\n", if muscle == "w" { format!("x{i}") } else { muscle.to_owned() });
     }
     fs::write(folder.join("fleet.csv"), &manifest).unwrap();
-    let said = json(&host(folder, &["batch", "fleet.csv", "-o", "spoiled", "--only", "fit", "--json"]));
+    let said = answer(&host(folder, &["batch", "fleet.csv", "-o", "spoiled", "--only", "fit", "--json"]));
     assert_eq!(said["failed"].as_u64().unwrap(), WAYS.len() as u64, "{said:#}");
     let spoiled = folder.join("spoiled");
     for ((what, code, _), name) in WAYS.iter().zip(&names) {
@@ -340,6 +348,7 @@ fn a_spoiled_muscle_is_a_failure_and_the_others_are_untouched() {
         }
         assert_eq!(table(&spoiled, name, "fits").rows(), 0, "{what}");
     }
+    let ways: Vec<[&str; 2]> = WAYS.iter().map(|(what, code, _)| [*what, *code]).collect();
     let (clean, all) = (tree(&folder.join("clean")), tree(&spoiled));
     assert!(
         clean.iter().all(|(path, bytes)| all.get(path) == Some(bytes)),
@@ -353,12 +362,13 @@ fn a_spoiled_muscle_is_a_failure_and_the_others_are_untouched() {
     }
     fs::copy(folder.join("m1").join("muscle.toml"), folder.join("w00/muscle.toml")).unwrap();
     fs::copy(folder.join("w00/a.csv"), folder.join("w00/none.csv")).unwrap();
-    let again = json(&host(folder, &["batch", "fleet.csv", "-o", "spoiled", "--only", "fit", "--json"]));
+    let again = answer(&host(folder, &["batch", "fleet.csv", "-o", "spoiled", "--only", "fit", "--json"]));
     assert_eq!(again["computed"], 1, "{again:#}");
     let strict = command(folder, &["batch", "fleet.csv", "-o", "spoiled", "--only", "fit", "--strict"])
         .output()
         .unwrap();
     assert_eq!(strict.status.code(), Some(1));
+    println!("figures: {}", json!({"ways": ways, "untouched_files": clean.len()}));
 }
 
 /// Who may not read a file gets a failure that says so. Root may read every file.
@@ -384,7 +394,7 @@ fn a_file_without_permission_and_a_name_that_is_no_text_do_not_stop_the_others()
         .find(|e| e.path().extension().unwrap() == "csv")
         .unwrap();
     fs::rename(other.path(), folder.join("m1").join(odd)).unwrap();
-    let said = json(&host(folder, &["batch", "fleet.csv", "-o", "out", "--only", "fit", "--json"]));
+    let said = answer(&host(folder, &["batch", "fleet.csv", "-o", "out", "--only", "fit", "--json"]));
     assert_eq!(said["failed"], u64::from(!readable), "{said:#}");
     assert_eq!(table(&folder.join("out"), "m 1", "fits").rows(), 1);
     if !readable {
