@@ -43,9 +43,9 @@ def main():
         "",
         "## Interrupted batches",
         "",
-        f"`host batch` with {kills['muscles']} muscles was ended by SIGKILL at random moments and called again. A test fails if a muscle that was "
-        "complete is computed again, if a folder of a muscle lacks a table or has one that cannot be read, or if the output of a completed "
-        "batch differs in one byte from that of a batch without interruption.",
+        f"`host batch` with {kills['muscles']} muscles was ended by SIGKILL at random moments and called again. The test fails if a muscle that was "
+        "complete is computed again, or if a folder of a muscle lacks a readable table. It also fails if the output of a completed batch differs "
+        "in one byte from that of a batch without interruption.",
         "",
         *table(
             ["interruptions", "batches completed", "files compared with an uninterrupted batch", "complete muscles found after interruptions", "computed twice"],
