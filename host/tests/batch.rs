@@ -69,6 +69,17 @@ fn tree(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
+/// Both folders hold the same files with the same bytes.
+fn same(one: &Path, other: &Path, when: &str) {
+    same_files(&tree(one), &tree(other), when);
+}
+
+fn same_files(one: &BTreeMap<PathBuf, Vec<u8>>, other: &BTreeMap<PathBuf, Vec<u8>>, when: &str) {
+    let names: std::collections::BTreeSet<&PathBuf> = one.keys().chain(other.keys()).collect();
+    let apart: Vec<_> = names.into_iter().filter(|name| one.get(*name) != other.get(*name)).collect();
+    assert!(apart.is_empty(), "{when}: {apart:?}");
+}
+
 /// The rows of one table of one muscle.
 fn table(output: &Path, muscle: &str, name: &str) -> Columns {
     let path = output.join(pam_fleet::partition::folder_name(muscle)).join(format!("{name}.parquet"));
@@ -112,7 +123,10 @@ fn a_killed_batch_continues_and_ends_with_the_same_bytes() {
         }
         // As soon as a batch is complete the next begins with an empty folder.
         if complete(&folder.join("killed")).len() as u64 == muscles {
-            assert_eq!(tree(&folder.join("whole")), tree(&folder.join("killed")), "round {round}");
+            // A run that was killed after its last muscle leaves its place of unfinished results, which the next run removes.
+            let mut found = tree(&folder.join("killed"));
+            found.retain(|path, _| !path.starts_with(".partial"));
+            same_files(&tree(&folder.join("whole")), &found, &format!("round {round}"));
             fs::remove_dir_all(folder.join("killed")).unwrap();
             batches += 1;
         }
@@ -136,9 +150,8 @@ fn a_killed_batch_continues_and_ends_with_the_same_bytes() {
     let last = answer(&host(folder, &["batch", "fleet.csv", "-o", "killed", "--only", "fit", "--json"]));
     assert_eq!(last["reused"].as_u64().unwrap(), before);
     assert_eq!(last["computed"].as_u64().unwrap(), muscles - before);
-    let bytes = tree(&folder.join("whole"));
-    assert_eq!(bytes, tree(&folder.join("killed")));
-    let files = bytes.len();
+    same(&folder.join("whole"), &folder.join("killed"), "the last batch");
+    let files = tree(&folder.join("whole")).len();
     println!(
         "figures: {}",
         json!({"kills": killed, "batches": batches, "muscles": muscles, "kept": kept, "files": files})
