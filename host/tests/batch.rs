@@ -123,7 +123,7 @@ fn a_killed_batch_continues_and_ends_with_the_same_bytes() {
         }
         // As soon as a batch is complete the next begins with an empty folder.
         if complete(&folder.join("killed")).len() as u64 == muscles {
-            // A run that was killed after its last muscle leaves its place of unfinished results, which the next run removes.
+            // A run that was stopped after its last muscle leaves its place of unfinished results, which the next run removes.
             let mut found = tree(&folder.join("killed"));
             found.retain(|path, _| !path.starts_with(".partial"));
             same_files(&tree(&folder.join("whole")), &found, &format!("round {round}"));
