@@ -6,6 +6,7 @@ mod outcome;
 mod region;
 mod remark;
 mod summary;
+pub mod tell_apart;
 pub mod timeline;
 mod value;
 mod why;

@@ -8,6 +8,7 @@
 
 mod answer;
 mod cells;
+mod metric;
 mod rests;
 mod weigh;
 

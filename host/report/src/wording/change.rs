@@ -10,6 +10,8 @@ use pam_diagnose::reference::answer::{
 };
 use pam_diagnose::reference::shapes::{Change, Class, Owner};
 
+use super::tell_apart;
+
 /// How recordings were held out.
 #[must_use]
 pub fn split(split: Split) -> &'static str {
@@ -324,6 +326,10 @@ fn one(text: &mut String, m: &Changed) {
     if !m.confusable_with.is_empty() {
         let _ = writeln!(text, "  or          {}", m.confusable_with.join(", "));
     }
+    let apart = tell_apart::named(m);
+    if !apart.is_empty() {
+        let _ = writeln!(text, "  to tell     {}", apart.join("; "));
+    }
 }
 
 /// The answer for a terminal.
@@ -344,6 +350,9 @@ pub fn summary(r: &ChangeReport) -> String {
     );
     for m in &r.missing {
         one(&mut text, m);
+    }
+    if let Some((names, apart)) = tell_apart::unnamed(r) {
+        let _ = writeln!(text, "one of: {}; to tell which: {}", names.join(", "), apart.join("; "));
     }
     if !r.missing.is_empty() {
         let h = &r.held_out;

@@ -28,7 +28,8 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
         t,
         "{} of {drawn} pairs are answered, each once. The set's seed is secret; its SHA-256, `{hash}`, was written before the first pair was made. Strata are \
          mixed evenly over the numbers, so that a part of them is nearly a stratified share. Counted are single effects of at least {LEAST} % of the \
-         blocked force (99.5 % quantile); the first name counts. A bound that is missed is missed: the set is not drawn again.\n",
+         blocked force (99.5 % quantile); the first name counts. A bound that is missed is missed: no set is drawn for one engine twice. The \
+         [first set](proof-reference-bench-first.md) was answered by an earlier engine; this one was drawn once the engine had changed.\n",
         all.len()
     );
     let _ = writeln!(t, "| | n | bound | measured | |\n| --- | --- | --- | --- | --- |");

@@ -1,6 +1,6 @@
 //! How strongly the cells support each effect of the catalogue as the change.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::contrast::{log_mean, log_sum};
@@ -10,6 +10,7 @@ use super::super::criteria::{
 };
 use super::super::shapes::{Change, Class};
 use super::cells::Cells;
+use super::metric::{Metric, is_same, usual, with_error};
 use crate::candidates::{Candidate, library};
 
 /// One effect at its best shape.
@@ -47,109 +48,6 @@ pub(super) struct Weighed {
     pub accepted: Vec<Accepted>,
     /// Every effect as the only change.
     pub alone: Vec<Fit>,
-}
-
-/// The metric of the cells: the inverse of `D + s²GG' + ZZ'`, freed of what was named before. `D` is the cells' own variance; `G` gives
-/// each state a difference of its own, of deviation `s`, which no law describes; `Z` is what campaigns usually differ by.
-struct Metric<'a> {
-    cells: &'a Cells,
-    inverse: DVector<f64>,
-    /// By group, 1/(1/s² + Σ 1/d).
-    shrunk: Vec<f64>,
-    z: DMatrix<f64>,
-    images: DMatrix<f64>,
-    factor: Option<Cholesky<f64, Dyn>>,
-    /// Log density of the difference without an effect, up to a constant.
-    density: f64,
-    projected: DVector<f64>,
-}
-
-impl<'a> Metric<'a> {
-    fn of(cells: &'a Cells, usual: &[DVector<f64>], deviation: f64) -> Self {
-        let n = cells.cells.len();
-        let inverse = cells.variance.map(|v| 1.0 / v);
-        let mut sums = vec![0.0; cells.groups];
-        for (i, w) in inverse.iter().enumerate() {
-            sums[cells.group[i]] += w;
-        }
-        let s2 = deviation * deviation;
-        let shrunk = sums.iter().map(|w| 1.0 / (1.0 / s2 + w)).collect();
-        let z = if usual.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(usual) };
-        let spread: f64 = cells.variance.iter().map(|v| v.ln()).sum::<f64>()
-            + sums.iter().map(|w| (s2 * w).ln_1p()).sum::<f64>();
-        let mut metric = Self {
-            cells,
-            inverse,
-            shrunk,
-            images: z.clone(),
-            z,
-            factor: None,
-            density: 0.0,
-            projected: DVector::zeros(n),
-        };
-        for k in 0..metric.z.ncols() {
-            let image = metric.own(&metric.z.column(k).into_owned());
-            metric.images.set_column(k, &image);
-        }
-        let inner = DMatrix::identity(metric.z.ncols(), metric.z.ncols()) + metric.z.tr_mul(&metric.images);
-        metric.factor = inner.cholesky();
-        let of_z: f64 =
-            metric.factor.as_ref().map_or(0.0, |f| f.l_dirty().diagonal().iter().map(|v| 2.0 * v.ln()).sum());
-        metric.projected = metric.apply(&cells.difference);
-        metric.density = -0.5 * (spread + of_z + cells.difference.dot(&metric.projected));
-        metric
-    }
-
-    /// Without `Z`.
-    fn own(&self, v: &DVector<f64>) -> DVector<f64> {
-        let mut weighted = v.component_mul(&self.inverse);
-        let mut sums = vec![0.0; self.shrunk.len()];
-        for (i, w) in weighted.iter().enumerate() {
-            sums[self.cells.group[i]] += w;
-        }
-        for i in 0..weighted.len() {
-            let g = self.cells.group[i];
-            weighted[i] -= self.inverse[i] * self.shrunk[g] * sums[g];
-        }
-        weighted
-    }
-
-    fn apply(&self, v: &DVector<f64>) -> DVector<f64> {
-        let own = self.own(v);
-        let Some(factor) = &self.factor else { return own };
-        let back = factor.solve(&self.images.tr_mul(v));
-        own - &self.images * back
-    }
-}
-
-/// What campaigns usually differ by without a change, as columns of one standard deviation; and what was named before, at any size.
-fn usual(cells: &Cells, taken: &[DVector<f64>]) -> Vec<DVector<f64>> {
-    let n = cells.cells.len();
-    let unit = CATALOGUE_USUAL * cells.largest;
-    let recordings = cells.cells.iter().map(|c| c.recording + 1).max().unwrap_or(0);
-    let zero = |recording: usize| {
-        DVector::from_fn(n, |i, _| if cells.cells[i].recording == recording { unit } else { 0.0 })
-    };
-    let mut columns: Vec<DVector<f64>> = (0..recordings).map(zero).collect();
-    let contexts = cells.rows.contexts();
-    let of_rows = |value: &dyn Fn(usize) -> f64| {
-        let column: Vec<f64> = (0..contexts.len()).map(value).collect();
-        cells.means(&column)
-    };
-    // The whole campaign: gain, zero of the gauge, stroke, friction.
-    let whole = [
-        of_rows(&|i| contexts[i].quasi),
-        of_rows(&|i| contexts[i].pull_per_pressure()),
-        of_rows(&|i| contexts[i].stiffness),
-        of_rows(&|i| contexts[i].quasi * contexts[i].direction),
-    ];
-    let scaled = |column: &DVector<f64>, size: f64| {
-        let peak = column.amax();
-        (peak > 0.0 && peak.is_finite()).then(|| column * (size / peak))
-    };
-    columns.extend(whole.iter().filter_map(|c| scaled(c, unit)));
-    columns.extend(taken.iter().filter_map(|c| scaled(c, 30.0 * cells.largest)));
-    columns
 }
 
 /// An effect at one set of shapes; `None` where the cells do not show it.
@@ -204,8 +102,8 @@ fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]
     Some(Fit { change, log, parameters, columns, trace, shapes: shapes.to_vec() })
 }
 
-/// The best shape of one effect, and its evidence as a mean over the grid.
-fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<Fit> {
+/// The best shape of one effect, and the log share of the grid that its evidence is a mean over.
+fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fit, f64)> {
     let grid = candidate.grid();
     let fits: Vec<Fit> = grid.iter().filter_map(|shapes| fit(cells, metric, candidate, shapes)).collect();
     let logs: Vec<f64> = fits.iter().map(|f| f.log).collect();
@@ -225,8 +123,27 @@ fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<Fit
         }
     }
     // What refinement gains is gained on a part of the grid's cell.
-    best.log = mean + (best.log - coarse);
-    Some(best)
+    Some((best, mean - coarse))
+}
+
+/// The evidence of a law over no change where its error is a share of its own trace.
+fn with_own_error(
+    cells: &Cells,
+    usual: &[DVector<f64>],
+    candidate: &Candidate,
+    (found, least): (Fit, &[f64]),
+) -> Fit {
+    let metric = Metric::of(cells, usual, &with_error(&cells.group, &found.trace, least));
+    let Some(own) = fit(cells, &metric, candidate, &found.shapes) else { return found };
+    Fit { log: own.log + metric.density, ..own }
+}
+
+/// For each law, those that these cells do not tell from it.
+fn alike(metric: &Metric<'_>, fits: &[Fit]) -> Vec<Vec<usize>> {
+    let images: Vec<DVector<f64>> = fits.iter().map(|f| metric.apply(&f.trace)).collect();
+    let product = |i: usize, k: usize| fits[i].trace.dot(&images[k]);
+    let same = |i: usize, k: usize| i == k || is_same(product(i, i), product(k, k), product(i, k));
+    (0..fits.len()).map(|i| (0..fits.len()).filter(|k| same(i, *k)).collect()).collect()
 }
 
 /// One weighing.
@@ -234,21 +151,27 @@ struct Round {
     none: f64,
     unknown: f64,
     fits: Vec<(Fit, f64)>,
+    /// For each of `fits`, which of them have the same trace in these cells.
+    alike: Vec<Vec<usize>>,
 }
 
 impl Round {
-    /// `first`: rms of what was named before, N.
-    fn of(cells: &Cells, candidates: &[Candidate], taken: &[DVector<f64>], none: f64, first: f64) -> Self {
+    /// `least`: what no law describes in each state, N.
+    fn of(cells: &Cells, candidates: &[Candidate], taken: &[DVector<f64>], none: f64, least: &[f64]) -> Self {
         let columns = usual(cells, taken);
-        // What a law leaves of what it explains, no law describes.
-        let least = (CATALOGUE_USUAL * cells.largest).hypot(CATALOGUE_LAW_ERROR * first);
+        let beyond = |deviation: f64| least.iter().map(|l| l.hypot(deviation)).collect::<Vec<f64>>();
         let still = Metric::of(cells, &columns, least);
         let size = (cells.difference.norm_squared() / cells.cells.len().max(1) as f64).sqrt();
-        let metric = Metric::of(cells, &columns, least.hypot(CATALOGUE_LAW_ERROR * size));
-        let mut fits: Vec<Fit> = candidates.par_iter().filter_map(|c| scan(cells, &metric, c)).collect();
-        fits.iter_mut().for_each(|f| f.log += metric.density - still.density);
+        let metric = Metric::of(cells, &columns, &beyond(CATALOGUE_LAW_ERROR * size));
+        let one = |candidate: &Candidate| {
+            let (found, occam) = scan(cells, &metric, candidate)?;
+            let own = with_own_error(cells, &columns, candidate, (found, least));
+            Some(Fit { log: own.log + occam - still.density, ..own })
+        };
+        let mut fits: Vec<Fit> = candidates.par_iter().filter_map(one).collect();
         fits.sort_by(|a, b| b.log.total_cmp(&a.log).then(a.change.cmp(&b.change)));
-        let free = SIZES.map(|s| Metric::of(cells, &columns, s * cells.largest).density - still.density);
+        let free =
+            SIZES.map(|s| Metric::of(cells, &columns, &beyond(s * cells.largest)).density - still.density);
         let unknown = log_mean(&free);
         // States differ from a law together, not one by one.
         let factor = (cells.groups as f64 / CATALOGUE_INDEPENDENT).max(1.0);
@@ -259,31 +182,37 @@ impl Round {
             .collect();
         let total = log_sum(&logs);
         let p: Vec<f64> = logs.iter().map(|l| (l - total).exp()).collect();
-        Self { none: p[0], unknown: p[1], fits: fits.into_iter().zip(p[2..].iter().copied()).collect() }
+        let alike = alike(&metric, &fits);
+        Self {
+            none: p[0],
+            unknown: p[1],
+            fits: fits.into_iter().zip(p[2..].iter().copied()).collect(),
+            alike,
+        }
     }
 
     fn class(&self, class: Class) -> f64 {
         self.fits.iter().filter(|(f, _)| f.change.stroke_class() == class).map(|(_, p)| p).sum()
     }
 
-    /// The best name of the class that is more probable than not.
+    /// The best name of the class that is more probable than not; or of the names with one trace that together are, where the recordings do
+    /// not say which it is.
     fn leader(&self) -> Option<Accepted> {
-        let (fit, probability) = self.fits.iter().max_by(|a, b| {
-            let weight = |(f, p): &(Fit, f64)| (self.class(f.change.stroke_class()) >= NAMED, *p);
-            let (a, b) = (weight(a), weight(b));
-            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-        })?;
-        let class_probability = self.class(fit.change.stroke_class());
-        if !(class_probability >= NAMED) {
-            return None;
-        }
+        let class = |i: &usize| self.class(self.fits[*i].0.change.stroke_class());
+        let together = |i: &usize| self.alike[*i].iter().map(|k| self.fits[*k].1).sum::<f64>();
+        let best = |support: &dyn Fn(&usize) -> f64| {
+            let of = (0..self.fits.len()).filter(|i| support(i) >= NAMED);
+            of.max_by(|a, b| self.fits[*a].1.total_cmp(&self.fits[*b].1))
+        };
+        let chosen = best(&class).or_else(|| best(&together))?;
+        let (fit, probability) = &self.fits[chosen];
         let mut order: Vec<&(Fit, f64)> = self.fits.iter().collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
         let others = order.into_iter().filter(|(f, p)| f.change != fit.change && *p >= 0.02);
         Some(Accepted {
             fit: fit.clone(),
             probability: *probability,
-            class_probability,
+            class_probability: class(&chosen),
             competitors: others.map(|(f, _)| f.change).collect(),
         })
     }
@@ -294,14 +223,14 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
     let candidates: Vec<Candidate> = library(&cells.rows, &[]);
     let mut accepted: Vec<Accepted> = Vec::new();
     let mut taken: Vec<DVector<f64>> = Vec::new();
-    let first = Round::of(cells, &candidates, &taken, none, 0.0);
+    let mut least = vec![CATALOGUE_USUAL * cells.largest; cells.groups];
+    let first = Round::of(cells, &candidates, &taken, none, &least);
     let mut probabilities: Vec<(String, f64)> =
         first.fits.iter().map(|(f, p)| (f.change.name().to_owned(), *p)).collect();
     probabilities.push(("none".into(), first.none));
     probabilities.push(("unknown".into(), first.unknown));
     probabilities.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let first_none = first.none;
-    let mut explained = 0.0_f64;
     let alone = first.fits.iter().map(|(f, _)| f.clone()).collect();
     let mut round = first;
     while accepted.len() < MOST_CHANGES {
@@ -311,9 +240,52 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
             break;
         }
         taken.extend(next.fit.columns.iter().cloned());
-        explained = explained.hypot((next.fit.trace.norm_squared() / cells.cells.len() as f64).sqrt());
+        // What a law leaves of what it explains, no law describes.
+        least = with_error(&cells.group, &next.fit.trace, &least);
         accepted.push(next);
-        round = Round::of(cells, &candidates, &taken, none, explained);
+        round = Round::of(cells, &candidates, &taken, none, &least);
     }
     Weighed { probabilities, none: first_none, last_none: round.none, accepted, alone }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn round(of: &[(Change, f64)], alike: &[usize]) -> Round {
+        let fit = |(change, p): &(Change, f64)| {
+            let fit = Fit {
+                change: *change,
+                log: 0.0,
+                parameters: Vec::new(),
+                columns: Vec::new(),
+                trace: DVector::zeros(1),
+                shapes: Vec::new(),
+            };
+            (fit, *p)
+        };
+        let own = |i: usize| if alike.contains(&i) { alike.to_vec() } else { vec![i] };
+        Round {
+            none: 0.0,
+            unknown: 0.0,
+            fits: of.iter().map(fit).collect(),
+            alike: (0..of.len()).map(own).collect(),
+        }
+    }
+
+    #[test]
+    fn names_with_one_trace_lead_together() {
+        let permanent = Change::from_name("permanent-set").expect("listed");
+        let shifts = [(Change::DisplacementOffset, 0.39), (Change::EndSlip, 0.35), (permanent, 0.26)];
+        let named = round(&shifts, &[0, 1, 2]).leader().expect("a name");
+        assert_eq!(named.fit.change, Change::DisplacementOffset);
+        assert_eq!(named.competitors, [Change::EndSlip, permanent]);
+        // Each with a trace of its own: none of them is more probable than not.
+        assert!(round(&shifts, &[]).leader().is_none());
+        // A class that leads goes before names of one trace.
+        let classes =
+            [(Change::CoulombFriction, 0.3), (Change::PressureFriction, 0.3), (Change::EndSlip, 0.4)];
+        let named = round(&classes, &[0, 2]).leader().expect("a name");
+        assert_eq!(named.fit.change.stroke_class(), Class::Friction);
+    }
 }
