@@ -2,6 +2,7 @@
 
 pub mod change;
 mod experiment;
+mod headline;
 mod outcome;
 mod region;
 mod remark;

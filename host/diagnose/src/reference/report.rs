@@ -157,6 +157,7 @@ fn beside_recordings(
         r.require_force()?;
     }
     sides::apart(whole, given)?;
+    sides::one_actuator(whole, given)?;
     let before = &stages::parted(whole);
     let mut remarks = units::check(before, after)?;
     remarks.extend(sides::order(before, after));

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::answer::Remark;
-use super::criteria::SHARED_ROWS;
+use super::criteria::{OTHER_LENGTH, SHARED_ROWS};
 use pam_data::date::{self, DateSource};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{Campaign, Recording};
@@ -55,6 +55,30 @@ pub(super) fn apart(before: &Campaign, after: &Campaign) -> Result<()> {
     Ok(())
 }
 
+/// Refuses recordings of two actuators, by the rest lengths that they state.
+///
+/// # Errors
+/// [`DataCode::CallInvalid`] with both lengths.
+pub(super) fn one_actuator(before: &Campaign, after: &Campaign) -> Result<()> {
+    let stated = |campaign: &Campaign| {
+        let mut all: Vec<f64> = campaign.recordings.iter().filter_map(|r| r.rest_length).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    };
+    match (stated(before), stated(after)) {
+        (Some(old), Some(new)) if !((new / old - 1.0).abs() <= OTHER_LENGTH) => Err(Error::new(
+            DataCode::CallInvalid,
+            format!(
+                "the reference is of an actuator with a rest length of {:.1} mm, AFTER of one with {:.1} mm",
+                old * 1e3,
+                new * 1e3
+            ),
+        )
+        .help("give recordings of one actuator")),
+        _ => Ok(()),
+    }
+}
+
 /// Dates of a campaign's recordings by their names, columns or clocks, s since 1970. A file's time of modification is no date: copies
 /// change it.
 fn dates(campaign: &Campaign) -> impl Iterator<Item = f64> + Clone {
@@ -101,6 +125,19 @@ mod tests {
         let error = apart(&first, &recording("b.csv", 60, 160)).expect_err("rows are in both");
         // Of 40 common rows the first has none before it to have moved from.
         assert!(error.cause().contains("overlap: 39 rows"), "{error}");
+    }
+
+    #[test]
+    fn rest_lengths_of_two_actuators_are_refused() {
+        let of = |rest: Option<f64>| {
+            let mut campaign = recording("a.csv", 0, 9);
+            campaign.recordings[0].rest_length = rest;
+            campaign
+        };
+        let error = one_actuator(&of(Some(0.166)), &of(Some(0.25))).expect_err("two actuators");
+        assert!(error.cause().contains("166.0 mm") && error.cause().contains("250.0 mm"), "{error}");
+        assert!(one_actuator(&of(Some(0.25)), &of(Some(0.252))).is_ok());
+        assert!(one_actuator(&of(None), &of(Some(0.252))).is_ok());
     }
 
     #[test]

@@ -12,6 +12,8 @@ use pam_diagnose::reference::shapes::{Change, Class, Owner};
 
 use super::tell_apart;
 
+pub use super::headline::headline;
+
 /// How recordings were held out.
 #[must_use]
 pub fn split(split: Split) -> &'static str {
@@ -294,20 +296,6 @@ pub fn sizes(all: &[Size]) -> String {
 pub fn in_usual_unit(value: f64, unit: &str) -> String {
     let (scale, unit) = usual_unit(value, unit);
     format!("{}{unit}", rounded(scale * value, scale * value.abs()))
-}
-
-/// The sentence that stands first.
-#[must_use]
-pub fn headline(r: &ChangeReport) -> String {
-    let names: Vec<&str> = r.missing.iter().map(|m| m.effect.as_str()).collect();
-    match r.verdict {
-        Verdict::Consistent => "Nothing changed beyond what this actuator does anyway.".into(),
-        Verdict::Explained => format!("What changed: {}.", names.join(", ")),
-        Verdict::PartlyExplained => format!("What changed: {}; something else is left.", names.join(", ")),
-        Verdict::Unexplained => {
-            "Something changed, and no single known change describes it well enough to be named.".into()
-        }
-    }
 }
 
 fn one(text: &mut String, m: &Changed) {

@@ -54,7 +54,10 @@ mod tests {
         let both = shows(["viscous-damping", "rate-power"].into_iter());
         assert_eq!(both.len(), 1, "{both:?}");
         assert!(both[0].contains("speeds"), "{both:?}");
-        assert_eq!(shows(["displacement-offset", "coulomb-friction", "contact-loss", "leak"].into_iter()).len(), 3);
+        assert_eq!(
+            shows(["displacement-offset", "coulomb-friction", "contact-loss", "leak"].into_iter()).len(),
+            3
+        );
         assert!(shows(["none", "friction-factor"].into_iter()).is_empty());
     }
 }

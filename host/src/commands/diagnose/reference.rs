@@ -73,7 +73,7 @@ pub(crate) fn read(
             recordings.read_watched(Reader::with_rest_length(ANY_LENGTH), console)
         }
         Err(e) if e.code() == DataCode::RecordingMissingColumn && e.cause().contains("displacement") => {
-            held(recordings, console).map_err(|second| if second.code() == e.code() { e } else { second })
+            held(recordings, console)
         }
         read => read,
     }

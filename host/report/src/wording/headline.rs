@@ -1,0 +1,45 @@
+//! The sentence with which an answer about changes begins.
+
+use pam_diagnose::reference::{ChangeReport, Verdict};
+
+/// "Nothing changed" is said with its probability where the recordings make it less probable than it counts before them.
+const DOUBTFUL: f64 = 0.8;
+
+/// The sentence that stands first.
+#[must_use]
+pub fn headline(r: &ChangeReport) -> String {
+    let names: Vec<&str> = r.missing.iter().map(|m| m.effect.as_str()).collect();
+    let explained = 1.0 - r.unexplained.share;
+    match r.verdict {
+        Verdict::Consistent => consistent(r.probability("none")),
+        Verdict::Explained => format!("What changed: {}.", names.join(", ")),
+        Verdict::PartlyExplained if explained < 0.5 => format!(
+            "What changed: {}. Of the difference this is {:.0} %; the larger part has no name.",
+            names.join(", "),
+            100.0 * explained
+        ),
+        Verdict::PartlyExplained => format!("What changed: {}; something else is left.", names.join(", ")),
+        Verdict::Unexplained => {
+            "Something changed, and no single known change describes it well enough to be named.".into()
+        }
+    }
+}
+
+fn consistent(none: f64) -> String {
+    if none < DOUBTFUL {
+        format!("No change stands out, but that nothing changed has a probability of {none:.2} only.")
+    } else {
+        "Nothing changed beyond what this actuator does anyway.".into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_changed_is_not_said_without_doubt_where_there_is_some() {
+        assert!(consistent(0.58).contains("0.58 only"));
+        assert!(consistent(0.97).starts_with("Nothing changed"));
+    }
+}
