@@ -5,7 +5,7 @@ use pam_data::recording::Campaign;
 use pam_diagnose::reference::answer::Curve;
 use pam_diagnose::reference::{ChangeReport, Verdict};
 
-use super::wording::{change as words, tell_apart};
+use super::wording::{change as words, separate};
 
 /// Panels in one picture, at most.
 const MOST_PANELS: usize = 6;
@@ -94,16 +94,16 @@ fn changes(r: &ChangeReport) -> Section {
         if !m.confusable_with.is_empty() {
             section.text(format!("These recordings cannot tell it from {}.", m.confusable_with.join(", ")));
         }
-        let apart = tell_apart::named(m);
+        let apart = separate::named(m);
         if !apart.is_empty() {
-            section.text(format!("To tell them apart: {}.", apart.join("; ")));
+            section.text(format!("To separate them: {}.", apart.join("; ")));
         }
     }
     if r.missing.is_empty() {
         section.text(words::headline(r));
     }
-    if let Some((names, apart)) = tell_apart::unnamed(r) {
-        section.text(format!("It is one of {}. To tell which: {}.", names.join(", "), apart.join("; ")));
+    if let Some((names, apart)) = separate::unnamed(r) {
+        section.text(format!("It is one of {}. To separate them: {}.", names.join(", "), apart.join("; ")));
     }
     section.list(r.remarks.iter().map(words::remark));
     section

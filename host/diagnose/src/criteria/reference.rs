@@ -241,7 +241,7 @@ pam_data::criteria! {
     CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
     /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
     CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
-    /// How inexact the law of an effect is, share of its trace in each state. Laws whose traces differ by less are not told apart.
+    /// How inexact the law of an effect is, share of its trace in each state. Laws whose traces differ by less are not distinguished.
     CATALOGUE_LAW_ERROR: f64 = 0.15, "catalogue_law_error", "1", Judgement;
     /// Independent pieces that the difference of a law from the actuator amounts to, at most.
     CATALOGUE_INDEPENDENT: f64 = 24.0, "catalogue_independent", "1", Judgement;

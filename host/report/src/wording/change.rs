@@ -10,7 +10,7 @@ use pam_diagnose::reference::answer::{
 };
 use pam_diagnose::reference::shapes::{Change, Class, Owner};
 
-use super::tell_apart;
+use super::separate;
 
 pub use super::headline::headline;
 
@@ -314,9 +314,9 @@ fn one(text: &mut String, m: &Changed) {
     if !m.confusable_with.is_empty() {
         let _ = writeln!(text, "  or          {}", m.confusable_with.join(", "));
     }
-    let apart = tell_apart::named(m);
+    let apart = separate::named(m);
     if !apart.is_empty() {
-        let _ = writeln!(text, "  to tell     {}", apart.join("; "));
+        let _ = writeln!(text, "  separate by {}", apart.join("; "));
     }
 }
 
@@ -339,8 +339,8 @@ pub fn summary(r: &ChangeReport) -> String {
     for m in &r.missing {
         one(&mut text, m);
     }
-    if let Some((names, apart)) = tell_apart::unnamed(r) {
-        let _ = writeln!(text, "one of: {}; to tell which: {}", names.join(", "), apart.join("; "));
+    if let Some((names, apart)) = separate::unnamed(r) {
+        let _ = writeln!(text, "one of: {}; separate them by: {}", names.join(", "), apart.join("; "));
     }
     if !r.missing.is_empty() {
         let h = &r.held_out;

@@ -124,7 +124,7 @@ pub(super) fn with_error(state: &[usize], trace: &DVector<f64>, least: &[f64]) -
     sums.into_iter().zip(least).map(|(sum, least)| least.hypot(CATALOGUE_LAW_ERROR * own(sum))).collect()
 }
 
-/// Whether two traces differ by less than a law is inexact by, by their products in the metric: then the cells do not tell them apart, at any
+/// Whether two traces differ by less than a law is inexact by, by their products in the metric: then the cells do not distinguish them, at any
 /// size.
 pub(super) fn is_same(first: f64, second: f64, both: f64) -> bool {
     let cosine = both / (first * second).sqrt();

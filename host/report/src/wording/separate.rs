@@ -1,4 +1,4 @@
-//! What tells changes apart that recordings do not.
+//! What separates changes that recordings do not.
 
 use pam_diagnose::reference::answer::{ChangeReport, Changed};
 use pam_diagnose::reference::shapes::Change;
@@ -7,7 +7,7 @@ use super::experiment::measure;
 
 /// Proposals in one answer, at most.
 const MOST_PROPOSALS: usize = 3;
-/// A name that is more improbable is none of those to tell apart.
+/// A name that is more improbable is none of those to separate.
 const LEAST: f64 = 0.05;
 
 /// What shows each of these changes, in their order.
@@ -22,7 +22,7 @@ fn shows<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'static str> {
     all
 }
 
-/// What to record or to measure so that a named change is told from those that may be meant instead; nothing without such.
+/// What to record or to measure that separates a named change from those that may be meant instead; nothing without such.
 #[must_use]
 pub fn named(m: &Changed) -> Vec<&'static str> {
     if m.confusable_with.is_empty() {
@@ -31,7 +31,7 @@ pub fn named(m: &Changed) -> Vec<&'static str> {
     shows(std::iter::once(m.effect.as_str()).chain(m.confusable_with.iter().map(String::as_str)))
 }
 
-/// The names that are possible where none is given, with what tells them apart; nothing where they are improbable even together.
+/// The names that are possible where none is given, with what separates them; nothing where they are improbable even together.
 #[must_use]
 pub fn unnamed(r: &ChangeReport) -> Option<(Vec<&str>, Vec<&'static str>)> {
     let possible = || r.probabilities.iter().filter(|p| Change::from_name(&p.cause).is_some());
