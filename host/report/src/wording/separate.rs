@@ -22,7 +22,7 @@ fn shows<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'static str> {
     all
 }
 
-/// What to record or to measure that separates a named change from those that may be meant instead; nothing without such.
+/// What to record or to measure to separate a named change from those that may be meant instead; nothing without such.
 #[must_use]
 pub fn named(m: &Changed) -> Vec<&'static str> {
     if m.confusable_with.is_empty() {
