@@ -59,7 +59,7 @@ echo "fleet: workflow, dry run on Slurm and queries of the book: 3 passed, 0 fai
 if [ -n "${PAM_LONG:-}" ]; then
     "$python" "$here/buckets.py" "$programs/host" "$programs/virtual-bench"
     if command -v npx > /dev/null; then
-        "$python" "$here/azure.py" "$programs/host" "$programs/virtual-bench"
+        "$python" "$here/buckets_azure.py" "$programs/host" "$programs/virtual-bench"
     else
         echo "tests/fleet/run.sh: skipped: Azure: npm is missing" >&2
     fi

@@ -1,6 +1,6 @@
 """Runs `host batch` on a container of a real Azure storage server on this machine (Azurite), and compares the results with those of a folder.
 
-    python3 azure.py HOST VIRTUAL_BENCH     HOST is built with the feature `buckets`; needs npm and azure-storage-blob
+    python3 buckets_azure.py HOST VIRTUAL_BENCH     HOST is built with the feature `buckets`; needs npm and azure-storage-blob
 
 The server checks signatures. Nothing leaves this machine.
 """
