@@ -146,6 +146,10 @@ fn what_cannot_be_compared_is_said_with_a_remedy() {
     std::fs::write(bench.0.path().join("short.csv"), "time_s,pressure_kPa\n0,1\n1,2\n").unwrap();
     let (status, _, said) = bench.ask(&[bench.0.path().join("short.csv")], &before, &[]);
     assert!(status == 1 && said.contains("help"), "{said}");
+    // Without a length the actuator counts as held: what is missing then is the pressure.
+    std::fs::write(bench.0.path().join("joint.csv"), "time_s,angle_rad,force_N\n0,1,1\n1,2,1\n").unwrap();
+    let (status, _, said) = bench.ask(&[bench.0.path().join("joint.csv")], &before, &[]);
+    assert!(status == 1 && said.contains("no column of pressure"), "{said}");
 }
 
 #[test]
