@@ -42,7 +42,8 @@ const EPOCH: f64 = 1.7e9;
 #[test]
 fn a_bag_of_ros_2_is_described_and_read() {
     let guessed = guess(&fixture("ros2.mcap"), None).unwrap();
-    let named: Vec<(Quantity, &str)> = guessed.columns.iter().map(|c| (c.quantity, c.header.as_str())).collect();
+    let named: Vec<(Quantity, &str)> =
+        guessed.columns.iter().map(|c| (c.quantity, c.header.as_str())).collect();
     assert_eq!(
         named,
         [
@@ -99,7 +100,8 @@ fn json_file(rows: &[(&str, u64, String)]) -> Vec<u8> {
             .entry(topic)
             .or_insert_with(|| writer.add_channel(0, topic, "json", &BTreeMap::new()).unwrap());
         let log_time = 1_000_000 * ms;
-        let header = MessageHeader { channel_id, sequence: sequence as u32, log_time, publish_time: log_time };
+        let header =
+            MessageHeader { channel_id, sequence: sequence as u32, log_time, publish_time: log_time };
         writer.write_to_known_channel(&header, text.as_bytes()).unwrap();
     }
     writer.finish().unwrap();

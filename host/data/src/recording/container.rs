@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::column_table::{Column, ColumnTable, damaged};
-use super::source::Source;
 use super::mcap::Needed;
+use super::source::Source;
 use super::{matlab, mcap, tdms};
 use crate::bounds::{self, Budget};
 use crate::error::{DataCode, Error, Result};

@@ -260,7 +260,8 @@ impl<'a> Reader<'a> {
             names.extend(self.filters.iter().map(|(name, text)| Value::of_option(name, text).0));
             names
         });
-        let pressure = self.import.and_then(|i| i.described(Quantity::Pressure)).map(|c| c.column.to_string());
+        let pressure =
+            self.import.and_then(|i| i.described(Quantity::Pressure)).map(|c| c.column.to_string());
         let needed = Needed { columns: names.as_deref(), pressure: pressure.as_deref() };
         let (table, _) = container::columns(path, container, &mut source, needed)?;
         self.take_columns(path, table)

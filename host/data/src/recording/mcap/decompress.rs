@@ -15,8 +15,7 @@ pub(super) fn records(chunk: &Chunk<'_>) -> Result<Vec<u8>, String> {
     let most = chunk.uncompressed + 1;
     match chunk.compression {
         "zstd" => {
-            let decoder =
-                ruzstd::decoding::StreamingDecoder::new(chunk.records).map_err(|e| damaged(&e))?;
+            let decoder = ruzstd::decoding::StreamingDecoder::new(chunk.records).map_err(|e| damaged(&e))?;
             decoder.take(most).read_to_end(&mut out).map_err(|e| damaged(&e))?;
         }
         "lz4" => {

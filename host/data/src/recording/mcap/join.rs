@@ -79,17 +79,19 @@ impl<'a> Series<'a> {
 }
 
 /// The table, and what the user has to know of it.
-pub(super) fn join(topics: &[Topic], needed: Needed<'_>, budget: &mut Budget) -> Result<(ColumnTable, Vec<String>)> {
-    let read: Vec<&Topic> = topics.iter().filter(|t| t.values.rows > 0 && !t.values.fields.is_empty()).collect();
+pub(super) fn join(
+    topics: &[Topic],
+    needed: Needed<'_>,
+    budget: &mut Budget,
+) -> Result<(ColumnTable, Vec<String>)> {
+    let read: Vec<&Topic> =
+        topics.iter().filter(|t| t.values.rows > 0 && !t.values.fields.is_empty()).collect();
     let used: Vec<&Topic> = read.iter().copied().filter(|t| is_needed(t, needed)).collect();
     let used = if used.is_empty() { read.clone() } else { used };
     let Some(clock) = clock(&used, needed) else { return Err(nothing(topics)) };
     let by_stamp = used.iter().all(|t| t.has_stamps());
-    let series: Vec<Series<'_>> = read
-        .iter()
-        .filter(|t| !by_stamp || t.has_stamps())
-        .map(|t| Series::new(t, by_stamp))
-        .collect();
+    let series: Vec<Series<'_>> =
+        read.iter().filter(|t| !by_stamp || t.has_stamps()).map(|t| Series::new(t, by_stamp)).collect();
     let is_used = |s: &&Series<'_>| used.iter().any(|u| std::ptr::eq(*u, s.topic));
     let moving = |s: &&Series<'_>| s.topic.values.fields.iter().any(|f| !f.steps);
     let spans = || series.iter().filter(is_used).filter(moving).filter_map(Series::span);
@@ -176,8 +178,10 @@ fn no_common_time(used: &[&Topic]) -> Error {
 }
 
 fn notes(clock: &Topic, series: &[Series<'_>], used: &[&Topic], by_stamp: bool) -> Vec<String> {
-    let time = if by_stamp { "the stamp in the header of each message" } else { "the log time of each message" };
-    let mut notes = vec![format!("{TIME} is {time}, in seconds since 1970; a row is a message of {}", clock.name)];
+    let time =
+        if by_stamp { "the stamp in the header of each message" } else { "the log time of each message" };
+    let mut notes =
+        vec![format!("{TIME} is {time}, in seconds since 1970; a row is a message of {}", clock.name)];
     let others: Vec<String> = series
         .iter()
         .filter(|s| !std::ptr::eq(s.topic, clock) && used.iter().any(|u| std::ptr::eq(*u, s.topic)))

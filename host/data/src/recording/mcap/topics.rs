@@ -143,9 +143,10 @@ impl<'a> Topics<'a> {
             ("json", _) => Ok(Decoder::Json),
             ("ros1", Some(schema)) if schema.encoding == "ros1msg" => definition(schema, Version::Ros1),
             ("cdr", Some(schema)) if schema.encoding == "ros2msg" => definition(schema, Version::Ros2),
-            (encoding, Some(schema)) => {
-                Err(format!("messages in `{encoding}` with a schema in `{}`, which are not read", schema.encoding))
-            }
+            (encoding, Some(schema)) => Err(format!(
+                "messages in `{encoding}` with a schema in `{}`, which are not read",
+                schema.encoding
+            )),
             (encoding, None) => Err(format!("messages in `{encoding}` without a schema")),
         }
     }

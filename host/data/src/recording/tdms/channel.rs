@@ -108,7 +108,13 @@ impl Channel {
     }
 
     /// Adds texts: the end of each, then all of them.
-    pub(super) fn add_texts(&mut self, raw: &[u8], count: usize, big: bool, budget: &mut Budget) -> Result<()> {
+    pub(super) fn add_texts(
+        &mut self,
+        raw: &[u8],
+        count: usize,
+        big: bool,
+        budget: &mut Budget,
+    ) -> Result<()> {
         /// Values that a text takes beside its letters.
         const OVERHEAD: usize = size_of::<String>() / size_of::<f64>() + 1;
         if matches!(&self.data, Data::Numbers(values) if values.is_empty()) {
@@ -122,7 +128,9 @@ impl Channel {
         let mut from = 0;
         for _ in 0..count {
             let to = ends.u32()? as usize;
-            let text = letters.get(from..to).ok_or_else(|| damaged("the ends of its texts contradict one another"))?;
+            let text = letters
+                .get(from..to)
+                .ok_or_else(|| damaged("the ends of its texts contradict one another"))?;
             texts.push(String::from_utf8_lossy(text).into_owned());
             from = to;
         }
@@ -140,8 +148,8 @@ pub(super) enum Property {
 impl Property {
     pub(super) fn read(bytes: &mut Bytes<'_>) -> Result<Self> {
         let number = bytes.u32()?;
-        let kind = Kind::of(number)
-            .ok_or_else(|| damaged(format!("a property has the unknown type {number}")))?;
+        let kind =
+            Kind::of(number).ok_or_else(|| damaged(format!("a property has the unknown type {number}")))?;
         if kind == Kind::Text {
             return bytes.text().map(Self::Text);
         }

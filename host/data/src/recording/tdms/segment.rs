@@ -213,8 +213,8 @@ impl File {
 
 fn index(list: &mut Bytes<'_>, path: &str) -> Result<Index> {
     let number = list.u32()?;
-    let kind = Kind::of(number)
-        .ok_or_else(|| damaged(format!("{path} has values of the unknown type {number}")))?;
+    let kind =
+        Kind::of(number).ok_or_else(|| damaged(format!("{path} has values of the unknown type {number}")))?;
     let (dimensions, count) = (list.u32()?, list.u64()?);
     if dimensions != 1 {
         return Err(damaged(format!("{path} has arrays of {dimensions} dimensions, the format has one")));

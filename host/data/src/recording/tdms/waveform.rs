@@ -28,7 +28,9 @@ pub(super) fn timed(mut channels: Vec<Channel>, budget: &mut Budget) -> Result<T
     let waves: Vec<usize> = (0..channels.len()).filter(|c| of(&channels[*c]).is_some()).collect();
     let is_pressure = |c: &&usize| is_reading_of(&channels[**c].column_name(true), Quantity::Pressure);
     let longest = waves.iter().max_by_key(|c| length(&channels[**c]));
-    let Some(&clock) = waves.iter().find(is_pressure).or(longest) else { return Ok((None, Vec::new(), channels)) };
+    let Some(&clock) = waves.iter().find(is_pressure).or(longest) else {
+        return Ok((None, Vec::new(), channels));
+    };
     // A channel of times, as some programs write beside the waveform's properties, says more than they do.
     if channels.iter().any(|c| is_reading_of(&c.column_name(true), Quantity::Time)) {
         return Ok((None, Vec::new(), channels));
@@ -69,7 +71,8 @@ pub(super) fn timed(mut channels: Vec<Channel>, budget: &mut Budget) -> Result<T
         }
     }
     let start = if with_start { "wf_start_time, wf_start_offset" } else { "wf_start_offset" };
-    let mut notes = vec![format!("{TIME} is from the properties {start} and wf_increment of {}", channels[clock].name)];
+    let mut notes =
+        vec![format!("{TIME} is from the properties {start} and wf_increment of {}", channels[clock].name)];
     if !others.is_empty() {
         let names: Vec<&str> = others.iter().map(|c| channels[*c].name.as_str()).collect();
         notes.push(format!(
@@ -96,7 +99,9 @@ fn interpolated(values: &[f64], place: f64, steps: bool) -> f64 {
     let place = place.max(0.0);
     let before = place.floor().min((values.len().max(1) - 1) as f64) as usize;
     match (values.get(before), values.get(before + 1)) {
-        (Some(value), Some(next)) if !steps => value + (next - value) * (place - before as f64).clamp(0.0, 1.0),
+        (Some(value), Some(next)) if !steps => {
+            value + (next - value) * (place - before as f64).clamp(0.0, 1.0)
+        }
         (Some(value), _) => *value,
         (None, _) => f64::NAN,
     }
