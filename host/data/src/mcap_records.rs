@@ -182,7 +182,7 @@ impl<'a> Channel<'a> {
     }
 }
 
-/// How messages are laid out.
+/// How messages are arranged.
 #[derive(Debug, Clone, Copy)]
 pub struct Schema<'a> {
     /// Its number in the file.

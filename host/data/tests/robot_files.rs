@@ -55,7 +55,7 @@ fn a_bag_of_ros_2_is_described_and_read() {
         "{}",
         guessed.description
     );
-    // The rule of the join is told, and stays in the description.
+    // The rule of the join is printed, and stays in the description.
     let told = guessed.description.contains("a row is a message of muscle/pressure_kPa");
     assert!(told && guessed.description.contains("interpolated linearly"), "{}", guessed.description);
     assert!(guessed.description.contains("the log time of each message"), "{}", guessed.description);

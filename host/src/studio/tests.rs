@@ -324,7 +324,7 @@ fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhil
     });
 }
 
-/// A studio with an emulated controller whose bench stands still.
+/// A studio with an emulated controller whose bench does not move.
 async fn with_a_still_bench(speed: f64) -> (Studio, Emulated) {
     let studio = Studio::new();
     let spec = BenchSpec::laboratory(muscle("mini").unwrap(), 2);
@@ -411,7 +411,7 @@ fn the_guide_identifies_the_regulator_and_a_vent_ends_it() {
         };
         let (ended, pressed) = tokio::join!(studio.shared.post(steps()), press);
         assert!(pressed.starts_with("HTTP/1.1 204"), "{pressed}");
-        assert!(ended.is_err(), "the steps went on after the vent");
+        assert!(ended.is_err(), "the steps continued after the vent");
         studio.state(|s| s["state"] == "disarmed").await;
     });
 }

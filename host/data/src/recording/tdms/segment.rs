@@ -25,7 +25,7 @@ const OPEN: u64 = u64::MAX;
 /// The index of an object without values, and of one whose values are as in the segment before.
 const NONE: u32 = u32::MAX;
 const AS_BEFORE: u32 = 0;
-/// Objects that are visited in all segments together: a file of so many tiny segments takes minutes.
+/// Objects that are visited in all segments together: a file with more tiny segments takes minutes.
 const MOST_VISITS: usize = 50_000_000;
 
 /// How the values of a channel are stored in a chunk.
