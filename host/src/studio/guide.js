@@ -46,7 +46,7 @@ function showPairs() {
     const row = document.createElement("tr"), input = document.createElement("input"), button = document.createElement("button");
     input.type = "number"; input.step = "any"; input.value = pair.value; input.setAttribute("aria-label", `known value ${number + 1}`);
     input.addEventListener("input", () => { pair.value = input.value; judgePairs(); });
-    button.type = "button"; button.textContent = pair.signal === null ? "Measure" : "Measure again"; button.className = "small"; button.dataset.measure = number;
+    button.type = "button"; button.textContent = pair.signal === null ? "Measure" : "Again"; button.className = "small"; button.dataset.measure = number;
     button.addEventListener("click", () => measure(pair, button));
     const cell = (...inside) => { const td = document.createElement("td"); td.append(...inside); return td; };
     const error = pair.error === null ? "" : `${pair.error < 0 ? "−" : "+"}${Math.abs(pair.error).toPrecision(3)} ${unitOfSensor()}`;
