@@ -9,15 +9,13 @@ use std::time::{Duration, Instant};
 
 use model_core::check;
 use model_core::image;
-use model_core::link::endpoints::{
-    ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, StartMode, Stop,
-};
+use model_core::link::endpoints::{ClearFault, GetFaults, GetSettings, GetStatus, StartMode, Stop};
 use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry};
 use model_core::link::settings::Settings;
 use tokio::sync::broadcast;
 
-use super::super::answers::{Answer, Difference, Ended, Faults, Flashed, StoredSettings};
+use super::super::answers::{Answer, Difference, Ended, Faults, Flashed};
 use super::super::events::{Controller, batch, compared, credible, tell};
 use super::{Order, no_controller, report};
 use crate::change_watch::ChangeWatch;
@@ -349,25 +347,6 @@ impl Connected {
             }
         }
         Ok(Answer::Done)
-    }
-
-    fn settings(&mut self, changes: &[String]) -> Result<Answer> {
-        let mut settings = self.client.call::<GetSettings>(&())?;
-        if !changes.is_empty() {
-            for change in changes {
-                settings = crate::commands::device::changed(settings, change)?;
-            }
-            let kept = self.client.call_once::<SetSettings>(&settings)?;
-            let read = self.client.call::<GetSettings>(&())?;
-            if kept != settings || read != settings {
-                return Err(Error::new(
-                    DeviceCode::DeviceVerify,
-                    "the settings read back from the device differ from those sent",
-                ));
-            }
-        }
-        self.settings = settings;
-        Ok(Answer::Settings(Box::new(StoredSettings { stored: settings, defaults: Settings::default() })))
     }
 
     fn difference(&mut self, path: &std::path::Path) -> Result<Answer> {

@@ -1,17 +1,44 @@
-//! What the guide of the first set-up orders: signals and calibration of the sensors, identification of the pressure regulator.
+//! Settings, and what the guide of the first set-up orders: signals and calibration of the sensors, identification of the pressure regulator.
 
 use model_core::link::endpoints::{GetSettings, GetStatus, ReadSignals, SetSettings};
 use model_core::link::messages::{Side, SignalsRead};
+use model_core::link::settings::Settings;
 use pam_device::calibration::{Pair, Sensor, scale_through};
 use pam_device::error::DeviceCode;
 use pam_device::{Subscription, regulator};
 
 use super::Connected;
 use crate::commands::device::regulator_text;
-use crate::studio::answers::{Answer, Calibrated, Identified, SensorSignal, Signals};
+use crate::studio::answers::{Answer, Calibrated, Identified, SensorSignal, Signals, StoredSettings};
 use pam_data::error::{DataCode, Error, Result};
 
 impl Connected {
+    /// Changes settings, each `KEY=VALUE`; the answer is all of them.
+    pub(super) fn settings(&mut self, changes: &[String]) -> Result<Answer> {
+        let mut settings = self.client.call::<GetSettings>(&())?;
+        for change in changes {
+            settings = crate::commands::device::changed(settings, change)?;
+        }
+        if !changes.is_empty() {
+            self.write(settings)?;
+        }
+        self.settings = settings;
+        Ok(Answer::Settings(Box::new(StoredSettings { stored: settings, defaults: Settings::default() })))
+    }
+
+    /// Writes settings and reads them back.
+    fn write(&mut self, settings: Settings) -> Result<()> {
+        let kept = self.client.call_once::<SetSettings>(&settings)?;
+        if kept != settings || self.client.call::<GetSettings>(&())? != settings {
+            return Err(Error::new(
+                DeviceCode::DeviceVerify,
+                "the settings read back from the device differ from those sent",
+            ));
+        }
+        self.settings = settings;
+        Ok(())
+    }
+
     /// Means of the signals since this was ordered before: the page orders twice, so that no order waits.
     pub(super) fn signals(&mut self) -> Result<Answer> {
         let means = self.client.call_once::<ReadSignals>(&SignalsRead { side: Side::Agonist })?;
@@ -31,14 +58,7 @@ impl Connected {
         let found = scale_through(pairs, &before)?;
         if keep {
             *sensor.scale_mut(&mut settings) = found.scale;
-            let kept = self.client.call_once::<SetSettings>(&settings)?;
-            if kept != settings || self.client.call::<GetSettings>(&())? != settings {
-                return Err(Error::new(
-                    DeviceCode::DeviceVerify,
-                    "the settings read back from the device differ from those sent",
-                ));
-            }
-            self.settings = settings;
+            self.write(settings)?;
         }
         let (unit, si) = sensor.unit();
         let shown = |value: f32| f64::from(value) / si;
