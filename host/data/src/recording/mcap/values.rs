@@ -107,7 +107,7 @@ impl Values {
         }
         let (seconds, nanoseconds) = std::mem::take(&mut self.stamp);
         self.next = 0;
-        let valid = seconds >= 0.0 && seconds < 1e10 && (0.0..1e9).contains(&nanoseconds);
+        let valid = (0.0..1e10).contains(&seconds) && (0.0..1e9).contains(&nanoseconds);
         let stamp = (seconds as u64).saturating_mul(1_000_000_000).saturating_add(nanoseconds as u64);
         Ok((valid && stamp > 0).then_some(stamp))
     }
