@@ -26,6 +26,9 @@ done
 say() { echo "tests/all.sh: $*"; }
 has() { command -v "$1" >/dev/null 2>&1; }
 
+# Steps beside others end with the script.
+trap 'kill $(jobs -p) 2>/dev/null || true' EXIT
+
 failed=0
 report=()
 # A step that fails does not stop the others.
@@ -35,6 +38,35 @@ step() {
     echo "== $name =="
     "$@" || { failed=1; outcome=FAILED; }
     report+=("$(printf '%-28s %-7s %5d s' "$name" "$outcome" $((SECONDS - start)))")
+}
+
+# Starts a step beside the steps that follow: one that mostly waits, for simulated time or for downloads. `join` prints what it said.
+beside_names=() beside_pids=() beside_logs=()
+beside() {
+    local name=$1 log
+    shift
+    log=$(mktemp)
+    {
+        start=$SECONDS status=0
+        "$@" || status=$?
+        echo $((SECONDS - start)) > "$log.seconds"
+        exit $status
+    } > "$log" 2>&1 < /dev/null &
+    beside_names+=("$name") beside_pids+=($!) beside_logs+=("$log")
+}
+
+# Waits for all steps of `beside`.
+join() {
+    local i outcome
+    for i in "${!beside_names[@]}"; do
+        outcome=passed
+        wait "${beside_pids[$i]}" || { failed=1; outcome=FAILED; }
+        echo "== ${beside_names[$i]} =="
+        cat "${beside_logs[$i]}"
+        report+=("$(printf '%-28s %-7s %5d s' "${beside_names[$i]}" "$outcome" "$(cat "${beside_logs[$i]}.seconds")")")
+        rm -f "${beside_logs[$i]}" "${beside_logs[$i]}.seconds"
+    done
+    beside_names=() beside_pids=() beside_logs=()
 }
 
 # Whether a tool is there; in continuous integration the distribution's packages are installed first. Its absence is a failure there.
@@ -71,6 +103,30 @@ browser() {
 
 packages() {
     cargo build --quiet --locked --workspace --bin pam && bash packaging/test.sh "$target/debug/pam"
+}
+
+# The names of test programs whose source matches a pattern.
+programs() {
+    cargo metadata --no-deps --locked --format-version 1 | tr '{' '\n' | grep '^"kind":\["test"\]' | grep "$@" | sed 's/.*"name":"\([^"]*\)".*/\1/' | sort -u
+}
+
+# Names as options of `cargo test`.
+chosen() { sed 's/^/--test /'; }
+
+# Tests of the emulated controller wait for most of their time, so they run beside the others. The same packages are selected for both:
+# others would have other features, and compile everything again. A name that both have runs here.
+emulator_tests() {
+    # shellcheck disable=SC2046 # words on purpose
+    cargo test --workspace --locked --no-fail-fast $(programs /tests/emulator/ | chosen)
+}
+
+other_tests() {
+    local status=0
+    # shellcheck disable=SC2046 # words on purpose
+    cargo test --workspace --locked --no-fail-fast --lib --bins --examples \
+        $(comm -23 <(programs .) <(programs /tests/emulator/) | chosen) || status=1
+    cargo test --workspace --locked --no-fail-fast --doc || status=1
+    return $status
 }
 
 language() {
@@ -114,12 +170,14 @@ else
     [ -d ../shared/data ] || say "skipped: tests on real recordings: ../shared/data does not exist"
     step "firmware image, emulated" firmware/build --install mps2-an386
     step "firmware image, Nucleo" firmware/build nucleo-f446re
-    step "tests" cargo test --workspace --locked --no-fail-fast
+    step "build of the tests" cargo test --quiet --workspace --locked --no-run
+    beside "tests with the emulator" emulator_tests
+    if require "Python bindings" python3 python3 python3-venv; then
+        beside "Python bindings" bash host/python/tests/run.sh
+    fi
+    step "tests" other_tests
     if require "live view in a browser" python3 python3 && require "live view in a browser" chromedriver chromium chromium-driver; then
         step "live view in a browser" browser
-    fi
-    if require "Python bindings" python3 python3 python3-venv; then
-        step "Python bindings" bash host/python/tests/run.sh
     fi
     if has dpkg-deb; then
         step "packages" packages
@@ -132,6 +190,7 @@ else
     if require "image of the Nucleo, executed" python3 python3 python3-venv; then
         step "image of the Nucleo, executed" bash tests/nucleo/run.sh
     fi
+    join
 fi
 if [ $tier = long ]; then
     step "long tests" env PAM_LONG=1 cargo test --workspace --release --locked --no-fail-fast \

@@ -10,7 +10,7 @@
 //! | supply pressure low | `follow_ticks` below `supply_low_pa` |
 //! | enable open | `debounce_ticks` |
 //! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
-//! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks`; a vented muscle whose pressure rises again, as when a person stretches it, has `vent_ticks` from then on |
+//! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks`; a vented muscle whose pressure rises again, as when it is stretched by hand, has `vent_ticks` from then on |
 //! | hold ended | `hold_ticks` of a held command |
 //! | setpoint silence | `silence_ticks` without one |
 //! | host silence | `host_silence_ticks` without a whole frame, while running and not `autonomous` |
@@ -320,7 +320,7 @@ impl SideWatch {
     ) {
         let (watch, fitted) = (&settings.watch, settings.pressure.fitted);
         let gap = pressure - expected;
-        // The gas of a vented muscle that a person stretches is compressed for a moment: it gets as long to leave as after the command.
+        // The gas of a vented muscle that is stretched by hand is compressed for a moment: it gets as long to leave as after the command.
         // Half of the limit, so that noise about the limit gives no new time.
         if pressure <= 0.5 * watch.vented_pa {
             self.vented_ticks = 0;

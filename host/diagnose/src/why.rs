@@ -76,8 +76,6 @@ pub enum Why {
         least_gain: f64,
         /// Error with a single time constant over that with the spectrum.
         one_time_constant_ratio: f64,
-        /// What was found in the recordings beside it.
-        findings: Vec<String>,
     },
     /// Given by the user; the fit gives it no size.
     GivenWithoutSize,

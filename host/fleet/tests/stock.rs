@@ -9,6 +9,7 @@ use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 use pam_fit::{Options, fit};
 use pam_fleet::stock::stock_fit;
+use serde_json::json;
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::campaigns;
 use virtual_bench::muscle::{Muscle, MuscleSpec};
@@ -76,9 +77,10 @@ fn unseen_pressures_are_predicted_better_than_alone_and_the_bands_hold() {
         let about = About { uncertainty: Some(stock.uncertainty.clone()), ..About::default() };
         let with = TableFile { table: stock.table.clone(), about };
         let (a, b) = (rms(&with), rms(&file(&stock.alone)));
+        let seen_kpa: Vec<f64> = levels.iter().map(|p| (p / 1e3).round()).collect();
         println!(
-            "seen {levels:.0?}: {a:.3} N with the stock, {b:.3} N alone, bands widened {:.2}",
-            stock.widened
+            "figures: {}",
+            json!({"seen_kPa": seen_kpa, "with_N": a, "alone_N": b, "widened": stock.widened})
         );
         with_square += a * a;
         alone_square += b * b;
@@ -103,10 +105,7 @@ fn unseen_pressures_are_predicted_better_than_alone_and_the_bands_hold() {
         }
     }
     let ratio = (with_square / alone_square).sqrt();
-    println!(
-        "error on unseen pressures: {ratio:.3} of alone; {:.1} % of the readings in the 95 % band",
-        100.0 * inside / rows
-    );
+    println!("figures: {}", json!({"ratio": ratio, "inside_pct": 100.0 * inside / rows}));
     assert!(ratio < 0.5, "{ratio}");
     assert!(inside / rows > 0.88, "{}", inside / rows);
 }

@@ -199,6 +199,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         // Of alternative laws those that were not chosen are zero.
         let (std, remark) = match p {
             p if p.value == 0.0 => ("–".to_owned(), "not used"),
+            p if p.std == Some(0.0) => ("–".to_owned(), "fixed"),
             p if p.outside_known_range => (std, "outside the published range"),
             _ => (std, ""),
         };

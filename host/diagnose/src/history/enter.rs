@@ -139,11 +139,11 @@ fn memory(history: &History, peak: f64) -> Missing {
     parameters.extend(history.law.time_constants_s.iter().enumerate().map(|(k, t)| ParameterValue {
         name: format!("time_constant_{}", k + 1),
         value: *t,
-        std: None,
+        // The spectrum's places are given.
+        std: Some(0.0),
         unit: "s".into(),
         outside_known_range: false,
     }));
-    let found = history.findings.iter().filter(|f| f.found).map(|f| f.words.clone()).collect();
     Missing {
         effect: NAMES[0].into(),
         probability,
@@ -171,7 +171,6 @@ fn memory(history: &History, peak: f64) -> Missing {
             gain: history.unseen.gain,
             least_gain: LEAST_GAIN,
             one_time_constant_ratio: history.law.one_time_constant_ratio,
-            findings: found,
         },
     }
 }

@@ -1,4 +1,4 @@
-//! NormalEquations equations, summed bin by bin.
+//! Normal equations, summed bin by bin.
 //!
 //! Points of nearly one pressure share their `φ_j`. Their normal equations are a small matrix in the columns
 //! `(c̃_1 … c̃_M, −s q, g, z)`. It is spread over the nodes only once per such bin, so that the work per point does not grow
@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::design::{Curves, Design, Layout};
 use crate::numerics::symmetric::Symmetric;
 
-/// NormalEquations equations at some parameters: `Σ w J Jᵀ`, `Σ w J r`, `Σ w r²`, `Σ w`.
+/// Normal equations at some parameters: `Σ w J Jᵀ`, `Σ w J r`, `Σ w r²`, `Σ w`.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
     /// The matrix `Σ w J Jᵀ`.
@@ -175,13 +175,25 @@ impl Design {
             return;
         }
         let layout = self.layout();
-        let (m, nodes, n) = (layout.order, layout.nodes, layout.len());
+        let (m, n) = (layout.order, layout.len());
         let d = m + 2 + self.extras;
         into.misfit += sums.misfit;
         into.weight += sums.weight;
         self.spread(&sums.right, phi, 1.0, &mut into.right);
-        // Functions that vanish here are left out: with few nodes none does, and nothing is lost.
-        let live: Vec<usize> = (0..nodes).filter(|j| phi[*j] != 0.0).collect();
+        // Functions that vanish here are left out: with few nodes none does, and nothing is lost. The others are neighbours.
+        let live = phi.iter().position(|p| *p != 0.0).unwrap_or(0)
+            ..phi.iter().rposition(|p| *p != 0.0).map_or(0, |last| last + 1);
+        let phi = &phi[live.clone()];
+        // `Σ value φ_i φ_j` into the block of the columns `a` and `b`.
+        let block = |matrix: &mut Symmetric, a: usize, b: usize, value: f64| {
+            for (i, p) in live.clone().zip(phi) {
+                let v = value * p;
+                let at = layout.elastic(a, i) * n + layout.elastic(b, live.start);
+                for (to, q) in matrix.a[at..at + phi.len()].iter_mut().zip(phi) {
+                    *to += v * q;
+                }
+            }
+        };
         let place = |a: usize| if a == m + 1 { Layout::DEADBAND } else { layout.extra(a - m - 2) };
         for a in 0..d {
             for b in 0..=a {
@@ -191,28 +203,14 @@ impl Design {
                 }
                 match (a <= m, b <= m) {
                     (true, true) => {
-                        for &i in &live {
-                            let row = layout.elastic(a, i) * n;
-                            let column = layout.elastic(b, 0);
-                            let v = value * phi[i];
-                            for &j in &live {
-                                into.matrix.a[row + column + j] += v * phi[j];
-                            }
-                        }
+                        block(&mut into.matrix, a, b, value);
                         if a != b {
-                            for &i in &live {
-                                let row = layout.elastic(b, i) * n;
-                                let column = layout.elastic(a, 0);
-                                let v = value * phi[i];
-                                for &j in &live {
-                                    into.matrix.a[row + column + j] += v * phi[j];
-                                }
-                            }
+                            block(&mut into.matrix, b, a, value);
                         }
                     }
                     (false, true) => {
-                        for &j in &live {
-                            into.matrix.add(place(a), layout.elastic(b, j), value * phi[j]);
+                        for (j, p) in live.clone().zip(phi) {
+                            into.matrix.add(place(a), layout.elastic(b, j), value * p);
                         }
                     }
                     _ => into.matrix.add(place(a), place(b), value),

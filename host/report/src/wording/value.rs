@@ -19,7 +19,7 @@ pub fn with_interval(value: f64, std: Option<f64>, unit: &str) -> String {
     let level = match (std, known) {
         (None, _) => " (interval not identifiable)",
         (_, Some(_)) => " (95 %)",
-        _ => "",
+        _ => " (fixed)",
     };
     match exponent {
         0 => format!("{body}{unit}{level}"),
@@ -37,6 +37,7 @@ mod tests {
         assert_eq!(with_interval(4.5924e-4, Some(1.419e-5), "m"), "(4.59 ± 0.28)·10^-4 m (95 %)");
         assert_eq!(with_interval(-810.2, Some(31.0), ""), "-810 ± 61 (95 %)");
         assert_eq!(with_interval(2.5, None, "s"), "2.500 s (interval not identifiable)");
+        assert_eq!(with_interval(10.0, Some(0.0), "s"), "10.000 s (fixed)");
         assert_eq!(with_interval(1e300, Some(f64::MIN_POSITIVE), "s"), "(1.00000 ± 0.00000)·10^300 s (95 %)");
     }
 }

@@ -8,15 +8,13 @@ pub fn why(why: &Why) -> String {
     match why {
         Why::Found(e) => evidence(e),
         Why::Measured { check, value } => format!("measured with {check}: {value}"),
-        Why::Memory { without_pct, with_pct, gain, least_gain, one_time_constant_ratio, findings } => {
-            format!(
-                "error of unseen runs: {without_pct:.2} % of the largest force without it, {with_pct:.2} % with it (rms); the squared error \
-             falls by {:.0} % (at least {:.0} % is required); a single time constant leaves {one_time_constant_ratio:.2} times as much; {}",
-                100.0 * gain,
-                100.0 * least_gain,
-                findings.join("; ")
-            )
-        }
+        // What was found stands under the history.
+        Why::Memory { without_pct, with_pct, gain, least_gain, one_time_constant_ratio } => format!(
+            "error of unseen runs: {without_pct:.2} % of the largest force without it, {with_pct:.2} % with it (rms); the squared error \
+             falls by {:.0} % (at least {:.0} % is required); a single time constant leaves {one_time_constant_ratio:.2} times as much",
+            100.0 * gain,
+            100.0 * least_gain,
+        ),
         Why::GivenWithoutSize => {
             "given, but the recordings do not support it: its fitted amplitude is zero".to_owned()
         }
