@@ -32,7 +32,7 @@ pub fn change_in_force() -> u32 {{
 # The tests take seconds. A change that makes them compute this long does not end, or hardly. Time of the processor: the machine may be
 # busy. Tests that wait without end are given up after ten times as long.
 PATIENCE_S = 60
-# The whole program is built in minutes. A constant whose loop does not end takes the compiler for ever: by its own lint
+# The whole program is built in minutes. A constant whose loop does not end never ends in the compiler: by its own lint
 # (`long_running_const_eval`, off here with all lints) that is an error.
 BUILD_PATIENCE_S = 600
 # Parts of the names of tests that take seconds, by their module. They run last, on changes of their module that the others do not notice.
