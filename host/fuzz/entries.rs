@@ -76,7 +76,7 @@ fn sound(recordings: &[Recording]) {
     }
 }
 
-/// Recordings of any form, which is recognised by the first bytes: text, compressed text, MATLAB, HDF5, Parquet, MCAP, workbooks. Each form
+/// Recordings of any form, which is recognised by the first bytes: text, compressed text, MATLAB, HDF5, Parquet, MCAP, TDMS, workbooks. Each form
 /// is a target with seeds of its own.
 pub fn reader(bytes: &[u8]) {
     if let Ok(recordings) = Reader::new().file(file(bytes, ".csv").path()) {

@@ -5,6 +5,7 @@ use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 
+use crate::program_name::in_called_name;
 use pam_data::error::Error;
 use pam_data::output::print;
 
@@ -24,6 +25,15 @@ pub fn printable(text: &str) -> Cow<'_, str> {
         if acts(c) { out.extend(c.escape_unicode()) } else { out.push(c) }
     }
     Cow::Owned(out)
+}
+
+/// What is said about commands, with the name by which the program was called.
+fn said(text: impl Display) -> String {
+    let text = in_called_name(text.to_string());
+    match printable(&text) {
+        Cow::Borrowed(_) => text,
+        Cow::Owned(escaped) => escaped,
+    }
 }
 
 /// A name from a file on one line: as [`printable`], and ends of lines are escaped as well.
@@ -107,21 +117,21 @@ impl Console {
     /// A step done, on standard error.
     pub fn note(&self, text: impl Display) {
         if !self.quiet {
-            let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
+            let _ = writeln!(std::io::stderr().lock(), "{}", said(text));
         }
     }
 
     /// A detail, on standard error, where `--verbose` asks for it.
     pub fn detail(&self, text: impl Display) {
         if self.verbose {
-            let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
+            let _ = writeln!(std::io::stderr().lock(), "{}", said(text));
         }
     }
 
     /// A remark about a result, on standard error.
     pub fn warning(&self, text: impl Display) {
         if !self.quiet {
-            let text = printable(&text.to_string()).into_owned();
+            let text = said(text);
             let _ = writeln!(std::io::stderr().lock(), "{}: {text}", self.paint("33", "warning"));
         }
     }
@@ -129,13 +139,13 @@ impl Console {
     /// What went wrong, where, and what to do.
     pub fn error(&self, error: &Error) {
         let head = self.paint("31", &format!("error[{}]", error.code().name()));
-        let mut text = format!("{head}: {}\n", printable(error.cause()));
+        let mut text = format!("{head}: {}\n", said(error.cause()));
         let place = error.place().to_string();
         if !place.is_empty() {
             text += &format!("   at: {}\n", printable(&place));
         }
         if let Some(advice) = error.advice() {
-            text += &format!("{}: {}\n", self.paint("36", " help"), printable(advice));
+            text += &format!("{}: {}\n", self.paint("36", " help"), said(advice));
         }
         let _ = std::io::stderr().lock().write_all(text.as_bytes());
     }

@@ -1,5 +1,5 @@
 //! The two names of the program: `host`, and `pam` where a system has another `host`. Help, completions and manual pages use the name
-//! that was called.
+//! that was called, and so do messages.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -36,6 +36,13 @@ fn with_name(command: clap::Command, name: &str) -> clap::Command {
         None => command,
     };
     command.mut_subcommands(|sub| with_name(sub, name))
+}
+
+/// A text about commands, with the called name in them: a system whose `host` is another program would start that one.
+#[must_use]
+pub(crate) fn in_called_name(text: String) -> String {
+    let name = called();
+    if name == WRITTEN { text } else { in_text(&text, name) }
 }
 
 /// `text` with the program called `name` where it stands as a command: at the start of a line or of a shell command, or in backquotes.

@@ -262,4 +262,9 @@ fn the_second_name_is_the_same_program() {
     assert!(said(&["--version"]).starts_with("pam "));
     assert!(said(&["completions", "bash"]).contains("complete -F _pam"));
     assert!(said(&["man"]).contains("pam"));
+    // Remedies name the command that this system has.
+    let missing =
+        Command::new(env!("CARGO_BIN_EXE_pam")).args(["table", "check", "none.pam"]).output().unwrap();
+    let text = String::from_utf8(missing.stderr).unwrap();
+    assert!(text.contains("`pam fit`") && !text.contains("`host"), "{text}");
 }

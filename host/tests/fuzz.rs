@@ -300,6 +300,11 @@ fn parquet_files() {
 }
 
 #[test]
+fn tdms_files() {
+    run("tdms", entries::reader, &[], &recordings(&[".tdms"]), 1_500);
+}
+
+#[test]
 fn workbooks() {
     run("workbook", entries::reader, &[], &recordings(&[".xlsx", ".ods"]), 600);
     run("sheet", entries::workbook::sheet, &entries::workbook::seeds(), &[], 1_500);
@@ -323,7 +328,7 @@ fn guessed_descriptions() {
         "import_guess",
         entries::import_guess,
         &made,
-        &recordings(&[".csv", ".xlsx", ".ods", "types.parquet"]),
+        &recordings(&[".csv", ".xlsx", ".ods", "types.parquet", ".tdms"]),
         600,
     );
 }

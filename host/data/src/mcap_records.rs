@@ -105,6 +105,12 @@ impl<'a> Chunk<'a> {
         Some(self.uncompressed == self.records.len() as u64 && crc.sum() == self.crc)
     }
 
+    /// The same chunk with its records decompressed.
+    #[must_use]
+    pub fn decompressed<'b>(&self, records: &'b [u8]) -> Chunk<'b> {
+        Chunk { compression: "", records, crc: self.crc, uncompressed: self.uncompressed }
+    }
+
     /// Kind and body of each record; ends at one whose length leads out of the chunk.
     pub fn iter(&self) -> impl Iterator<Item = (u8, &'a [u8])> + use<'a> {
         let mut rest = self.records;
@@ -149,12 +155,63 @@ pub fn plausible(kind: u8, body: &[u8]) -> bool {
     ends.is_some() && fields.0.is_empty()
 }
 
-/// Number and topic of a channel.
+/// What a channel says of its messages.
+#[derive(Debug, Clone, Copy)]
+pub struct Channel<'a> {
+    /// Its number in the file.
+    pub number: u16,
+    /// The number of its schema; 0 where there is none.
+    pub schema: u16,
+    /// The topic.
+    pub topic: &'a str,
+    /// How messages are written, such as `json`, `cdr`, `ros1`.
+    pub encoding: &'a str,
+}
+
+impl<'a> Channel<'a> {
+    /// `None` where the lengths in it contradict one another.
+    #[must_use]
+    pub fn parse(body: &'a [u8]) -> Option<Self> {
+        let mut fields = Fields(body);
+        Some(Self {
+            number: fields.u16()?,
+            schema: fields.u16()?,
+            topic: fields.text()?,
+            encoding: fields.text()?,
+        })
+    }
+}
+
+/// How messages are arranged.
+#[derive(Debug, Clone, Copy)]
+pub struct Schema<'a> {
+    /// Its number in the file.
+    pub number: u16,
+    /// The type of the messages, such as `sensor_msgs/msg/FluidPressure`.
+    pub name: &'a str,
+    /// How the schema is written, such as `ros2msg`.
+    pub encoding: &'a str,
+    /// The schema.
+    pub data: &'a [u8],
+}
+
+impl<'a> Schema<'a> {
+    /// `None` where the lengths in it contradict one another.
+    #[must_use]
+    pub fn parse(body: &'a [u8]) -> Option<Self> {
+        let mut fields = Fields(body);
+        let (number, name, encoding) = (fields.u16()?, fields.text()?, fields.text()?);
+        let length = fields.u32()? as usize;
+        Some(Self { number, name, encoding, data: fields.0.get(..length)? })
+    }
+}
+
+/// When a message was logged, ns since 1970.
 #[must_use]
-pub fn channel(body: &[u8]) -> Option<(u16, &str)> {
+pub fn log_time(body: &[u8]) -> Option<u64> {
     let mut fields = Fields(body);
-    let (number, _schema) = (fields.u16()?, fields.u16()?);
-    Some((number, fields.text()?))
+    let (_channel, _sequence) = (fields.u16()?, fields.u32()?);
+    fields.u64()
 }
 
 /// Channel, sequence number and data of a message.
@@ -193,7 +250,7 @@ impl<R: Read> Records<R> {
         Self { reader, begun: false, body: Vec::new() }
     }
 
-    /// The next record of a kind that holds samples: channels, messages, chunks. Others are passed over; `None` at the end of data.
+    /// The next record of a kind that holds samples: schemas, channels, messages, chunks. Others are passed over; `None` at the end of data.
     ///
     /// # Errors
     /// [`Trouble`].
@@ -213,7 +270,7 @@ impl<R: Read> Records<R> {
             let mut body = (&mut self.reader).take(length);
             match kind {
                 kind::DATA_END | kind::FOOTER => return Ok(None),
-                kind::CHANNEL | kind::MESSAGE | kind::CHUNK => {
+                kind::SCHEMA | kind::CHANNEL | kind::MESSAGE | kind::CHUNK => {
                     if length > LARGEST {
                         return Err(Trouble::TooLong(length));
                     }
@@ -257,7 +314,7 @@ mod tests {
         }
         // A text, an array of records: their announced lengths are looked for in what is there.
         assert!(Chunk::parse(&[0xff; 60]).is_none());
-        assert!(channel(&[0xff; 60]).is_none());
+        assert!(Channel::parse(&[0xff; 60]).is_none() && Schema::parse(&[0xff; 60]).is_none());
     }
 
     proptest! {
@@ -273,7 +330,7 @@ mod tests {
                     prop_assert!(chunk.iter().count() <= body.len());
                     let _ = chunk.intact();
                 }
-                let _ = (channel(body), message(body));
+                let _ = (Channel::parse(body), Schema::parse(body), message(body), log_time(body));
             }
         }
     }

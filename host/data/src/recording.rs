@@ -35,6 +35,7 @@ mod read;
 pub mod sensor_faults;
 mod source;
 mod stroke_zero;
+mod tdms;
 mod unit_check;
 #[cfg(feature = "excel")]
 mod workbook;

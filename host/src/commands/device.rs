@@ -18,6 +18,7 @@ use crate::console::Console;
 use crate::documents::{device as document, text};
 use pam_data::error::Result;
 
+pub(crate) use identify::{regulator_steps, regulator_text};
 pub(crate) use settings::changed;
 
 /// Arguments of `host device`.

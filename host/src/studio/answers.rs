@@ -24,6 +24,12 @@ pub enum Answer {
     Faults(Faults),
     /// The settings of the controller.
     Settings(Box<StoredSettings>),
+    /// Signals and readings of the sensors.
+    Signals(Signals),
+    /// The scale of a sensor.
+    Calibrated(Calibrated),
+    /// The pressure regulator.
+    Identified(Identified),
     /// The recording that was ended.
     Ended(Ended),
     /// What a table would change.
@@ -67,6 +73,43 @@ pub struct Faults {
 pub struct StoredSettings {
     pub(super) stored: Settings,
     pub(super) defaults: Settings,
+}
+
+/// The sensors that the board measures.
+#[derive(Debug, Serialize)]
+pub struct Signals {
+    pub(super) sensors: Vec<SensorSignal>,
+}
+
+/// One sensor.
+#[derive(Debug, Serialize)]
+pub struct SensorSignal {
+    pub(super) sensor: &'static str,
+    pub(super) unit: &'static str,
+    /// Mean of the signal.
+    pub(super) signal: f32,
+    /// The reading that the present scale makes of it.
+    pub(super) reading: f64,
+}
+
+/// A scale through known values, in the sensor's unit: value at a signal of zero, and value per unit of the signal.
+#[derive(Debug, Serialize)]
+pub struct Calibrated {
+    pub(super) unit: &'static str,
+    pub(super) before: [f64; 2],
+    pub(super) now: [f64; 2],
+    /// Value of the scale less known value, for each pair.
+    pub(super) errors: Vec<f64>,
+    /// Whether it is in the settings.
+    pub(super) kept: bool,
+}
+
+/// A pressure regulator that was found.
+#[derive(Debug, Serialize)]
+pub struct Identified {
+    pub(super) text: String,
+    /// Whether it is in the settings.
+    pub(super) kept: bool,
 }
 
 /// The recording that was ended.

@@ -9,7 +9,9 @@ use super::analysis::Analysis;
 use super::answers::{Answer, Emulated, Ended, VentPath};
 use super::server::{Shared, ended_in_fault};
 use super::session::{Connected, Order, Request};
+use crate::commands::device::regulator_steps;
 use pam_data::error::{DataCode, Error, Result};
+use pam_device::calibration::{Pair, Sensor};
 use pam_device::error::DeviceCode;
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_device::{Address, available};
@@ -20,27 +22,66 @@ use pam_device::{Address, available};
 pub(super) enum Posted {
     Ports,
     VentPath,
-    Connect { port: String },
-    Emulate { muscle: String },
+    Connect {
+        port: String,
+    },
+    Emulate {
+        muscle: String,
+    },
     Disconnect,
     Arm,
     Vent,
-    Follow { quantity: String, profile: String },
+    Follow {
+        quantity: String,
+        profile: String,
+    },
     Faults,
     Clear,
-    Settings { set: Vec<String> },
-    Mishap { code: u8 },
+    Settings {
+        set: Vec<String>,
+    },
+    Signals,
+    /// Known values in the sensor's unit, each with its signal.
+    Calibrate {
+        sensor: String,
+        pairs: Vec<[f64; 2]>,
+        keep: bool,
+    },
+    /// Pressures in kPa.
+    Identify {
+        low: f64,
+        high: f64,
+    },
+    KeepRegulator,
+    Mishap {
+        code: u8,
+    },
     Record,
     EndRecord,
-    Watch { reference: Compared },
+    Watch {
+        reference: Compared,
+    },
     Recordings,
-    Curves { number: usize },
-    Example { muscle: String },
-    Fit { muscle: String },
-    Diagnose { muscle: String },
-    Compare { a: usize, b: usize },
+    Curves {
+        number: usize,
+    },
+    Example {
+        muscle: String,
+    },
+    Fit {
+        muscle: String,
+    },
+    Diagnose {
+        muscle: String,
+    },
+    Compare {
+        a: usize,
+        b: usize,
+    },
     Difference,
-    Flash { table: String },
+    Flash {
+        table: String,
+    },
 }
 
 /// What a running controller is compared with.
@@ -50,6 +91,13 @@ pub(super) enum Compared {
     Nothing,
     Recordings,
     Table,
+}
+
+fn sensor_named(name: &str) -> Result<Sensor> {
+    Sensor::ALL
+        .into_iter()
+        .find(|sensor| sensor.name() == name)
+        .ok_or_else(|| Error::new(DataCode::CallInvalid, "there is no such sensor").value(name))
 }
 
 impl Shared {
@@ -124,6 +172,18 @@ impl Shared {
             Posted::Faults => self.order(Order::Faults).await,
             Posted::Clear => self.order(Order::Clear).await,
             Posted::Settings { set } => self.order(Order::Settings(set)).await,
+            Posted::Signals => self.order(Order::Signals).await,
+            Posted::Calibrate { sensor, pairs, keep } => {
+                let sensor = sensor_named(&sensor)?;
+                let pair = |[value, signal]: [f64; 2]| Pair { value: value * sensor.unit().1, signal };
+                let pairs = pairs.into_iter().map(pair).collect();
+                self.order(Order::Calibrate(sensor, pairs, keep)).await
+            }
+            Posted::Identify { low, high } => {
+                let [low, high] = regulator_steps(low, high)?;
+                self.order(Order::Identify(low, high)).await
+            }
+            Posted::KeepRegulator => self.order(Order::KeepRegulator).await,
             Posted::Mishap { code } => self.order(Order::Mishap(code)).await,
             Posted::Record => {
                 let path = self.apart(|a| Ok(a.next_run())).await?;

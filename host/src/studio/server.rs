@@ -38,7 +38,7 @@ use pam_device::error::DeviceCode;
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("studio.css");
 /// The parts of the page's program, each by its path.
-const SCRIPTS: [(&str, &str); 8] = [
+const SCRIPTS: [(&str, &str); 9] = [
     ("/signals.js", include_str!("signals.js")),
     ("/plot.js", include_str!("plot.js")),
     ("/history.js", include_str!("history.js")),
@@ -47,6 +47,7 @@ const SCRIPTS: [(&str, &str); 8] = [
     ("/studio.js", include_str!("studio.js")),
     ("/setpoint.js", include_str!("setpoint.js")),
     ("/settings.js", include_str!("settings.js")),
+    ("/guide.js", include_str!("guide.js")),
 ];
 
 /// Batches that a page may lag behind before it loses some: half a minute.

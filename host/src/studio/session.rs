@@ -20,6 +20,7 @@ use super::vent::Vent;
 use crate::change_watch::Reference;
 use pam_data::error::{DataCode, Error, Result};
 use pam_device::Address;
+use pam_device::calibration::{Pair, Sensor};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 
 /// What the page may request of the controller, except to vent: that has its own path ([`Vent`]).
@@ -39,6 +40,14 @@ pub enum Order {
     Faults,
     /// Forget the latched fault.
     Clear,
+    /// Means of the signals of the sensors since this was ordered before.
+    Signals,
+    /// The scale of a sensor through known values and the signals at them; kept in the settings if true.
+    Calibrate(Sensor, Vec<Pair>, bool),
+    /// Step the pressure between two values, Pa, and find the regulator.
+    Identify(f64, f64),
+    /// Keep the regulator that was found in the settings.
+    KeepRegulator,
     /// Change settings, each `KEY=VALUE`; the answer is all of them.
     Settings(Vec<String>),
     /// Let something go wrong on the emulated bench.
@@ -58,7 +67,7 @@ pub enum Order {
 impl Order {
     /// Whether the muscle may move because of it.
     fn moves(&self) -> bool {
-        matches!(self, Self::Arm | Self::Follow(..))
+        matches!(self, Self::Arm | Self::Follow(..) | Self::Identify(..))
     }
 }
 
@@ -133,6 +142,10 @@ impl Session<'_> {
             Order::Disconnect => {
                 let vented = self.close();
                 vented.map(|()| Answer::Done)
+            }
+            Order::Identify(low, high) => {
+                let stop = || vents != self.vent.count() || self.say.receiver_count() == 0;
+                self.connected.as_mut().ok_or_else(no_controller)?.identify(low, high, &stop)
             }
             other => self.connected.as_mut().ok_or_else(no_controller)?.obey(other),
         }

@@ -323,3 +323,95 @@ fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhil
         studio.state(|s| s["state"] == "disarmed").await;
     });
 }
+
+/// A studio with an emulated controller whose bench does not move.
+async fn with_a_still_bench(speed: f64) -> (Studio, Emulated) {
+    let studio = Studio::new();
+    let spec = BenchSpec::laboratory(muscle("mini").unwrap(), 2);
+    let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm: 0.0, frequency_hz: 0.5 };
+    let device = Emulated::start(Stand::new(spec, motion), Some(Kind::Native), speed).unwrap();
+    let patience = Patience { answer: HOPELESS, slow_answer: HOPELESS, ..Patience::default() };
+    let client = Client::connect(Port::open(device.address()).unwrap(), patience).unwrap();
+    let connected = Connected::new(device.address().clone(), client, None).unwrap();
+    studio.shared.order(Order::Replace(Box::new(connected))).await.unwrap();
+    let set = vec!["watch.autonomous=true".to_owned()];
+    studio.shared.post(Posted::Settings { set }).await.unwrap();
+    (studio, device)
+}
+
+async fn answer(studio: &Studio, posted: Posted) -> Value {
+    serde_json::to_value(studio.shared.post(posted).await.unwrap()).unwrap()
+}
+
+async fn stored(studio: &Studio, place: &str) -> f64 {
+    answer(studio, Posted::Settings { set: Vec::new() }).await["stored"]
+        .pointer(place)
+        .unwrap()
+        .as_f64()
+        .unwrap()
+}
+
+#[test]
+fn the_guide_calibrates_a_sensor_with_known_values() {
+    run(async {
+        let (studio, _device) = with_a_still_bench(1.0).await;
+        answer(&studio, Posted::Signals).await;
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        let seen = answer(&studio, Posted::Signals).await;
+        let stroke = seen["sensors"].as_array().unwrap().iter().find(|s| s["sensor"] == "stroke").unwrap();
+        let signal = stroke["signal"].as_f64().unwrap();
+        assert!((stroke["reading"].as_f64().unwrap() - 0.6).abs() < 0.05, "{stroke}");
+        let calibrate = |pairs: &[[f64; 2]], keep| Posted::Calibrate {
+            sensor: "stroke".into(),
+            pairs: pairs.to_vec(),
+            keep,
+        };
+        // One value moves the zero: the sensor reads 2 mm where it read 0.6 mm.
+        let found = answer(&studio, calibrate(&[[2.0, signal]], false)).await;
+        assert!((found["now"][0].as_f64().unwrap() - 1.4).abs() < 0.05 && found["kept"] == false, "{found}");
+        assert_eq!(stored(&studio, "/scales/stroke/at_zero").await, 0.0);
+        answer(&studio, calibrate(&[[2.0, signal]], true)).await;
+        assert!((stored(&studio, "/scales/stroke/at_zero").await - 1.4e-3).abs() < 5e-5);
+        // Two values give the slope: 10 mm for a change of the signal by 5 mm.
+        let pairs = [[0.0, signal], [10.0, signal + 5e-3]];
+        let found = answer(&studio, calibrate(&pairs, true)).await;
+        assert!(
+            found["errors"].as_array().unwrap().iter().all(|e| e.as_f64().unwrap().abs() < 1e-9),
+            "{found}"
+        );
+        assert!((stored(&studio, "/scales/stroke/per_unit").await - 2.0).abs() < 1e-5);
+        let refused = studio.shared.post(calibrate(&[[0.0, signal], [5.0, signal]], true)).await.unwrap_err();
+        assert!(refused.cause().contains("hardly differ"), "{refused}");
+        let unknown = Posted::Calibrate { sensor: "nose".into(), pairs: Vec::new(), keep: false };
+        assert!(studio.shared.post(unknown).await.is_err());
+    });
+}
+
+#[test]
+fn the_guide_identifies_the_regulator_and_a_vent_ends_it() {
+    run(async {
+        let (mut studio, _device) = with_a_still_bench(1.0).await;
+        assert!(
+            studio.shared.post(Posted::KeepRegulator).await.unwrap_err().cause().contains("no regulator")
+        );
+        let steps = || Posted::Identify { low: 100.0, high: 250.0 };
+        assert!(studio.shared.post(Posted::Identify { low: 100.0, high: 110.0 }).await.is_err());
+        let before = stored(&studio, "/regulator/lag_s").await;
+        let found = answer(&studio, steps()).await;
+        assert!(found["text"].as_str().unwrap().contains("gain"), "{found}");
+        assert_eq!(stored(&studio, "/regulator/lag_s").await, before);
+        assert_eq!(answer(&studio, Posted::KeepRegulator).await["kept"], true);
+        assert_ne!(stored(&studio, "/regulator/lag_s").await, before);
+        // The curves go on, and the muscle is vented.
+        studio.next(|m| m["k"] == "t").await;
+        studio.state(|s| s["state"] == "disarmed").await;
+        let press = async {
+            tokio::time::sleep(Duration::from_millis(1_500)).await;
+            studio.press_vent()
+        };
+        let (ended, pressed) = tokio::join!(studio.shared.post(steps()), press);
+        assert!(pressed.starts_with("HTTP/1.1 204"), "{pressed}");
+        assert!(ended.is_err(), "the steps continued after the vent");
+        studio.state(|s| s["state"] == "disarmed").await;
+    });
+}

@@ -1,4 +1,4 @@
-//! Files that hold named columns of numbers instead of text: MATLAB and Parquet.
+//! Files that hold named columns of numbers instead of text.
 
 #[cfg(feature = "parquet")]
 use std::fs::File;
@@ -7,8 +7,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use super::column_table::{Column, ColumnTable, damaged};
+use super::mcap::Needed;
 use super::source::Source;
-use super::{matlab, mcap};
+use super::{matlab, mcap, tdms};
 use crate::bounds::{self, Budget};
 use crate::error::{DataCode, Error, Result};
 
@@ -19,7 +20,15 @@ pub(super) enum Container {
     Hdf5,
     Parquet,
     Mcap,
+    Tdms,
+    /// Not read, but named with what helps.
+    RosBag,
+    /// As a bag of ROS 1.
+    Sqlite,
 }
+
+/// Columns, and remarks for the user.
+pub(super) type Contents = (ColumnTable, Vec<String>);
 
 impl Container {
     /// Recognises a container by its first bytes. An HDF5 file may begin with 512 bytes of the user's own; MATLAB's says so.
@@ -32,6 +41,12 @@ impl Container {
             Some(Self::Parquet)
         } else if magic.starts_with(mcap::MAGIC) {
             Some(Self::Mcap)
+        } else if magic.starts_with(tdms::MAGIC) {
+            Some(Self::Tdms)
+        } else if magic.starts_with(b"#ROSBAG V2.0") {
+            Some(Self::RosBag)
+        } else if magic.starts_with(b"SQLite format 3\0") {
+            Some(Self::Sqlite)
         } else {
             None
         }
@@ -43,17 +58,25 @@ impl Container {
             Self::Hdf5 => "MATLAB 7.3 or HDF5",
             Self::Parquet => "Parquet",
             Self::Mcap => "MCAP",
+            Self::Tdms => "TDMS",
+            Self::RosBag => "bag",
+            Self::Sqlite => "SQLite",
         }
     }
 
-    fn columns(self, path: &Path, source: &mut Source) -> Result<ColumnTable> {
-        match self {
-            Self::Matlab5 => {
-                matlab::columns(&bounds::whole(path, &mut source.reader, bounds::WHOLE)?, Budget::whole())
-            }
+    fn columns(self, path: &Path, source: &mut Source, needed: Needed<'_>) -> Result<Contents> {
+        let whole = |source: &mut Source| bounds::whole(path, &mut source.reader, bounds::WHOLE);
+        let table = match self {
             Self::Mcap => {
-                mcap::columns(BufReader::with_capacity(1 << 18, &mut source.reader), Budget::default())
+                let reader = BufReader::with_capacity(1 << 18, &mut source.reader);
+                return mcap::columns(reader, Budget::default(), needed);
             }
+            Self::Tdms => return tdms::columns(&whole(source)?, Budget::whole()),
+            Self::Matlab5 => matlab::columns(&whole(source)?, Budget::whole()),
+            Self::RosBag => Err(Error::new(DataCode::RecordingContainer, "the file is a bag of ROS 1")
+                .help("`mcap convert FILE.bag FILE.mcap` writes it as MCAP, which is read")),
+            Self::Sqlite => Err(Error::new(DataCode::RecordingContainer, "the file is a database of SQLite")
+                .help("if it is a bag of ROS 2, `mcap convert FILE.db3 FILE.mcap` or `ros2 bag convert` writes it as MCAP, which is read")),
             Self::Hdf5 | Self::Parquet if !source.again => Err(Error::new(
                 DataCode::FileUnreadable,
                 format!("a {} file cannot be read from a pipe", self.name()),
@@ -69,14 +92,20 @@ impl Container {
                 format!("this build does not read {} files", self.name()),
             )
             .help("it was built without the features `hdf5` and `parquet`: build it with them, or export the data as CSV")),
-        }
+        };
+        Ok((table?, Vec::new()))
     }
 }
 
-/// The columns of a container.
-pub(super) fn columns(path: &Path, container: Container, source: &mut Source) -> Result<ColumnTable> {
+/// The columns of a container, and what the user has to know of how they were made.
+pub(super) fn columns(
+    path: &Path,
+    container: Container,
+    source: &mut Source,
+    needed: Needed<'_>,
+) -> Result<Contents> {
     // A damaged file must end in an error, also where the reader of another library would rather panic.
-    let table = catch_unwind(AssertUnwindSafe(|| container.columns(path, source)))
+    let (table, notes) = catch_unwind(AssertUnwindSafe(|| container.columns(path, source, needed)))
         .unwrap_or_else(|_| Err(damaged("the file is damaged beyond what its reader expects")))
         .map_err(|e| {
             if e.code() == DataCode::RecordingContainer && !e.advised() {
@@ -98,7 +127,7 @@ pub(super) fn columns(path: &Path, container: Container, source: &mut Source) ->
              of vectors by `table2struct(T, 'ToScalar', true)`",
         ));
     }
-    Ok(table)
+    Ok((table, notes))
 }
 
 #[cfg(test)]

@@ -382,6 +382,18 @@ impl Import {
         })
     }
 
+    /// The names of all columns of the file that the description uses; `None` where it gives one by its number.
+    pub(super) fn names_in_file(&self) -> Option<Vec<String>> {
+        let described = self.columns.values().map(|c| match &c.column {
+            ColumnRef::Name(name) => Some(name.clone()),
+            ColumnRef::Number(_) => None,
+        });
+        let mut names: Vec<String> = described.collect::<Option<_>>()?;
+        names.extend(self.split_by.iter().chain(self.filters.keys()).cloned());
+        names.extend(self.lookup.iter().flat_map(|l| l.keys.values().chain(l.keys.keys())).cloned());
+        Some(names)
+    }
+
     pub(super) fn described(&self, quantity: Quantity) -> Option<&Column> {
         self.columns.get(quantity.name())
     }

@@ -125,6 +125,11 @@ impl Guess {
     }
 }
 
+/// Whether a column's name says that it is this quantity.
+pub(super) fn is_reading_of(name: &str, quantity: Quantity) -> bool {
+    names::Name::of(name).quantity().is_some_and(|(named, _)| named == quantity)
+}
+
 /// Looks at a file and describes it.
 ///
 /// # Errors

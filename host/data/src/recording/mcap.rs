@@ -1,4 +1,15 @@
-//! MCAP files of `host record`: the messages of the topic `/telemetry`, field by field, also of a file that was cut off.
+//! MCAP files: those of `host record`, by the fields of the topic `/telemetry`, also where the file was cut off; and those of other
+//! programs, by the numbers in all their topics.
+
+mod decompress;
+mod join;
+mod json;
+mod ros;
+mod ros_definition;
+#[cfg(test)]
+mod tests;
+mod topics;
+mod values;
 
 use std::collections::HashMap;
 use std::io::Read;
@@ -8,40 +19,89 @@ use serde_json::Value;
 use super::column_table::{Column, ColumnTable};
 use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
-use crate::mcap_records::{Chunk, Records, Trouble, channel, kind, message};
+use crate::mcap_records::{Channel, Chunk, Records, Schema, Trouble, kind, log_time, message};
 
+pub(super) use self::join::Needed;
+use self::topics::Topics;
 pub(super) use crate::mcap_records::MAGIC;
 
-/// The topic that holds samples.
+/// The topic of `host record` that holds samples.
 const TOPIC: &str = "/telemetry";
 
-/// Every field of the samples that is a number in all of them.
-pub(super) fn columns(reader: impl Read, budget: Budget) -> Result<ColumnTable> {
-    let mut samples = Samples { topics: HashMap::new(), table: Vec::new(), rows: 0, budget };
+/// The columns, and what the user has to know of them: of `host record`, every field of the samples that is a number in all of them; of
+/// others, every number of every topic that is needed, at the times of one of them.
+pub(super) fn columns(
+    reader: impl Read,
+    budget: Budget,
+    needed: Needed<'_>,
+) -> Result<(ColumnTable, Vec<String>)> {
+    let mut file = File {
+        samples: Samples { topics: HashMap::new(), table: Vec::new(), rows: 0, budget },
+        others: Some(Topics::new(needed.columns, budget)),
+    };
     let mut records = Records::new(reader);
     while let Some((kind, body)) = records.read().map_err(trouble)? {
-        match kind {
-            kind::CHUNK => {
-                let chunk = Chunk::parse(body)
-                    .ok_or_else(|| damaged("the lengths in a chunk contradict one another"))?;
-                if !chunk.compression.is_empty() {
-                    return Err(Error::new(
-                        DataCode::RecordingContainer,
-                        format!("the MCAP file is compressed by {}", chunk.compression),
-                    )
-                    .help("only files of `host record` are read; `mcap compress --compression none` writes such a file plain"));
-                }
-                if chunk.intact() == Some(false) {
-                    return Err(damaged("the checksum of a chunk does not fit"));
-                }
-                for (kind, body) in chunk.iter() {
-                    samples.take(kind, body)?;
-                }
-            }
-            other => samples.take(other, body)?,
+        if kind != kind::CHUNK {
+            file.take(kind, body)?;
+            continue;
+        }
+        let chunk =
+            Chunk::parse(body).ok_or_else(|| damaged("the lengths in a chunk contradict one another"))?;
+        let decompressed;
+        let chunk = if chunk.compression.is_empty() {
+            chunk
+        } else {
+            decompressed = decompress::records(&chunk).map_err(|e| damaged(&e))?;
+            chunk.decompressed(&decompressed)
+        };
+        if chunk.intact() == Some(false) {
+            return Err(damaged("the checksum of a chunk does not fit"));
+        }
+        for (kind, body) in chunk.iter() {
+            file.take(kind, body)?;
         }
     }
-    samples.finish()
+    match file.others {
+        Some(mut others) => join::join(&others.list, needed, &mut others.budget),
+        None => Ok((file.samples.finish()?, Vec::new())),
+    }
+}
+
+/// What was read of a file.
+struct File<'a> {
+    samples: Samples,
+    /// None where the file is of `host record`.
+    others: Option<Topics<'a>>,
+}
+
+impl File<'_> {
+    fn take(&mut self, kind: u8, body: &[u8]) -> Result<()> {
+        match kind {
+            kind::SCHEMA => {
+                let schema = Schema::parse(body).ok_or_else(|| damaged("a schema without a name"))?;
+                self.others.as_mut().map_or(Ok(()), |others| others.schema(&schema))
+            }
+            kind::CHANNEL => {
+                let channel = Channel::parse(body).ok_or_else(|| damaged("a channel without a topic"))?;
+                let own = channel.topic == TOPIC && ["json", ""].contains(&channel.encoding);
+                self.samples.topics.insert(channel.number, own);
+                if own {
+                    self.others = None;
+                }
+                self.others.as_mut().map_or(Ok(()), |others| others.channel(&channel))
+            }
+            kind::MESSAGE => {
+                let parts = message(body).zip(log_time(body));
+                let ((number, _, data), logged) = parts.ok_or_else(|| damaged("a message without a head"))?;
+                let known = match &mut self.others {
+                    Some(others) => others.message(number, logged, data)?,
+                    None => self.samples.message(number, data)?,
+                };
+                if known { Ok(()) } else { Err(damaged("a message of a channel that is not in the file")) }
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 fn damaged(what: &str) -> Error {
@@ -66,22 +126,12 @@ struct Samples {
 }
 
 impl Samples {
-    fn take(&mut self, kind: u8, body: &[u8]) -> Result<()> {
-        match kind {
-            kind::CHANNEL => {
-                let (number, topic) = channel(body).ok_or_else(|| damaged("a channel without a topic"))?;
-                self.topics.insert(number, topic == TOPIC);
-                Ok(())
-            }
-            kind::MESSAGE => {
-                let (number, _, data) = message(body).ok_or_else(|| damaged("a message without a head"))?;
-                match self.topics.get(&number) {
-                    Some(true) => self.sample(data),
-                    Some(false) => Ok(()),
-                    None => Err(damaged("a message of a channel that is not in the file")),
-                }
-            }
-            _ => Ok(()),
+    /// Takes a message; whether its channel is known.
+    fn message(&mut self, number: u16, data: &[u8]) -> Result<bool> {
+        match self.topics.get(&number) {
+            Some(true) => self.sample(data).map(|()| true),
+            Some(false) => Ok(true),
+            None => Ok(false),
         }
     }
 
@@ -118,52 +168,5 @@ impl Samples {
         // A column that is null throughout was not measured.
         let kept = self.table.into_iter().filter(|(_, v)| v.iter().any(|x| x.is_finite()));
         Ok(kept.map(|(name, v)| (name, Column::Numbers(v))).collect())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn record(out: &mut Vec<u8>, kind: u8, body: &[u8]) {
-        out.push(kind);
-        out.extend((body.len() as u64).to_le_bytes());
-        out.extend(body);
-    }
-
-    fn file(messages: &[&str]) -> Vec<u8> {
-        let mut out = MAGIC.to_vec();
-        let topic = [&[1, 0, 0, 0][..], &10_u32.to_le_bytes(), TOPIC.as_bytes(), &[0; 8]].concat();
-        record(&mut out, kind::CHANNEL, &topic);
-        for message in messages {
-            let body = [&[1, 0][..], &[0; 20], message.as_bytes()].concat();
-            record(&mut out, kind::MESSAGE, &body);
-        }
-        record(&mut out, kind::DATA_END, &[0; 4]);
-        out
-    }
-
-    #[test]
-    fn many_columns_and_many_short_messages_take_no_more_than_the_budget() {
-        let wide = (0..100).map(|i| format!("\"c{i}\":1")).collect::<Vec<_>>().join(",");
-        let wide = format!("{{{wide}}}");
-        let mut messages = vec![wide.as_str()];
-        messages.extend(["{}"; 99]);
-        let bytes = file(&messages);
-        assert_eq!(columns(bytes.as_slice(), Budget::new(10_000)).expect("fits").len(), 100);
-        let error = columns(bytes.as_slice(), Budget::new(9_999)).expect_err("does not fit");
-        assert_eq!(error.code(), DataCode::FileUnreadable);
-    }
-
-    #[test]
-    fn lengths_that_lead_out_of_the_file_are_refused() {
-        let mut bytes = MAGIC.to_vec();
-        record(&mut bytes, kind::CHANNEL, &[1, 0, 0, 0, 0xff, 0xff, 0xff, 0x7f]);
-        assert!(columns(bytes.as_slice(), Budget::default()).is_err());
-        let mut bytes = MAGIC.to_vec();
-        bytes.push(kind::CHUNK);
-        bytes.extend(2_700_000_000_u64.to_le_bytes());
-        let error = columns(bytes.as_slice(), Budget::default()).expect_err("too long");
-        assert!(error.cause().contains("2700000000"), "{error}");
     }
 }

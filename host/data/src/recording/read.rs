@@ -15,7 +15,8 @@ use super::container::{self, Container};
 use super::header::Header;
 use super::import::{Decimal, Import, Missing, Value};
 use super::lookup::read_lookup;
-use super::quantity::{Named, named};
+use super::mcap::Needed;
+use super::quantity::{Named, Quantity, named};
 use super::source;
 use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
@@ -255,7 +256,14 @@ impl<'a> Reader<'a> {
         container: Container,
         mut source: source::Source,
     ) -> Result<Vec<Recording>> {
-        let table = container::columns(path, container, &mut source)?;
+        let names = self.import.and_then(Import::names_in_file).map(|mut names| {
+            names.extend(self.filters.iter().map(|(name, text)| Value::of_option(name, text).0));
+            names
+        });
+        let pressure =
+            self.import.and_then(|i| i.described(Quantity::Pressure)).map(|c| c.column.to_string());
+        let needed = Needed { columns: names.as_deref(), pressure: pressure.as_deref() };
+        let (table, _) = container::columns(path, container, &mut source, needed)?;
         self.take_columns(path, table)
     }
 

@@ -7,7 +7,7 @@ use super::design::Layout;
 use super::problem::Problem;
 use super::screen::Screen;
 use super::smoothing::{self, Smoothing};
-use super::uncertainty::jackknife;
+use super::uncertainty::jackknife_root;
 use super::weights::robust;
 
 /// `P0` with its standard deviation, Pa.
@@ -85,6 +85,6 @@ fn by_order(
     };
     let (weights, parameters) = robust(&finer, screen, weights, parameters, smoothing);
     let penalty = finer.penalty(&parameters, &weights, smoothing);
-    let root = jackknife(&finer, screen, &weights, &parameters, &penalty, None).root;
+    let root = jackknife_root(&finer, screen, &weights, &parameters, &penalty);
     Some(Deadband { value: finer.deadband(&parameters), std: root.std(Layout::DEADBAND) })
 }

@@ -14,7 +14,7 @@ use super::points::{HeldMounting, Points};
 use super::problem::Problem;
 use super::screen::Screen;
 use super::smoothing::Smoothing;
-use super::uncertainty::jackknife;
+use super::uncertainty::jackknife_root;
 use super::weights::Weights;
 use crate::numerics::symmetric::dot;
 
@@ -296,7 +296,7 @@ impl Search<'_> {
     /// The problem with the found dimensions fixed, and the table's `size` parameters there.
     fn finish(mut self, screen: &Screen, size: usize) -> (Problem, Vec<f64>) {
         let penalty = self.problem.penalty(&self.parameters, self.weights, Smoothing::START);
-        let root = jackknife(&self.problem, screen, self.weights, &self.parameters, &penalty, None).root;
+        let root = jackknife_root(&self.problem, screen, self.weights, &self.parameters, &penalty);
         self.restore_forces();
         let Self { unknowns, weights, mut problem, mut parameters, at, .. } = self;
         let found = || unknowns.list.iter().zip(&at).enumerate();

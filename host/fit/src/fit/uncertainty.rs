@@ -50,15 +50,27 @@ pub(super) fn jackknife(
     penalty: &Symmetric,
     deadband_std: Option<f64>,
 ) -> Uncertain {
-    let (standard, block) = standardised(problem, screen, weights, parameters);
-    let correlation = correlation_time(&standard, &block);
-    let shown = (0..=SHOWN_LAGS).map(|lag| autocorrelation(&standard, &block, lag)).collect();
+    let residuals = Residuals::of(problem, screen, weights, parameters);
+    let correlation = residuals.correlation_time();
     let blocks = blocks(problem, weights, correlation);
     let mut root = leave_out(&problem.design, parameters, weights, penalty, &blocks);
     if let Some(std) = deadband_std {
         root.append(&follow_deadband(&problem.design, weights, parameters, penalty, std));
     }
-    Uncertain { root, blocks: blocks.len(), correlation, autocorrelation: shown }
+    let autocorrelation = (0..=SHOWN_LAGS).map(|lag| residuals.autocorrelation(lag)).collect();
+    Uncertain { root, blocks: blocks.len(), correlation, autocorrelation }
+}
+
+/// The root of the covariance alone, of a `P0` that is not held.
+pub(super) fn jackknife_root(
+    problem: &Problem,
+    screen: &Screen,
+    weights: &[f64],
+    parameters: &[f64],
+    penalty: &Symmetric,
+) -> CovarianceRoot {
+    let correlation = Residuals::of(problem, screen, weights, parameters).correlation_time();
+    leave_out(&problem.design, parameters, weights, penalty, &blocks(problem, weights, correlation))
 }
 
 /// How all parameters follow when a held `P0` moves by `std`, Pa.
@@ -99,45 +111,55 @@ fn leave_out(
     covariance_root(&columns, design.layout().len())
 }
 
-/// The residuals in standard deviations of their group (NaN where a point does not take part), and the half-stroke of each.
-fn standardised(
-    problem: &Problem,
-    screen: &Screen,
-    weights: &[f64],
-    parameters: &[f64],
-) -> (Vec<f64>, Vec<u32>) {
-    let residuals = problem.design.residuals(parameters);
-    let scatter = scatter(problem, screen, &residuals);
-    let list = &problem.points.list;
-    let standard = |i: usize| {
-        if weights[i] > 0.0 {
-            (residuals[i] / scatter[problem.group_of(i)]).clamp(-4.0, 4.0)
-        } else {
-            f64::NAN
-        }
-    };
-    ((0..list.len()).map(standard).collect(), list.iter().map(|p| p.block).collect())
+/// The residuals in standard deviations of their group (NaN where a point does not take part), correlated within half-strokes only.
+struct Residuals {
+    values: Vec<f64>,
+    /// The half-stroke of each.
+    block: Vec<u32>,
+    /// Sum of the squares of all values.
+    square: f64,
 }
 
-/// The autocorrelation at a lag of values that are correlated within blocks only; NaN is no value.
-///
-/// The sum of the products is divided by that of the squares of all values, not by its own count (the biased estimator: M. B. Priestley,
-/// Spectral Analysis and Time Series, Academic Press 1981, section 5.3.3). Divided by its count, a lag that only a few long blocks reach
-/// takes any value, also −1.
-fn autocorrelation(values: &[f64], block: &[u32], lag: usize) -> f64 {
-    let square: f64 = values.iter().filter(|v| v.is_finite()).map(|v| v * v).sum();
-    if !(square > 0.0) {
-        return if lag == 0 { 1.0 } else { 0.0 };
+impl Residuals {
+    fn new(values: Vec<f64>, block: Vec<u32>) -> Self {
+        let square = values.iter().filter(|v| v.is_finite()).map(|v| v * v).sum();
+        Self { values, block, square }
     }
-    let pairs = values.iter().zip(block).zip(values.iter().zip(block).skip(lag));
-    let products = pairs.filter(|((_, a), (_, b))| a == b).map(|((x, _), (y, _))| x * y);
-    products.filter(|p| p.is_finite()).sum::<f64>() / square
-}
 
-/// `1 + 2 Σ ρ_l`, summed until `ρ` falls below a twentieth.
-fn correlation_time(values: &[f64], block: &[u32]) -> f64 {
-    let lags = (1..400).map(|lag| autocorrelation(values, block, lag));
-    1.0 + 2.0 * lags.take_while(|rho| *rho >= 0.05).sum::<f64>()
+    fn of(problem: &Problem, screen: &Screen, weights: &[f64], parameters: &[f64]) -> Self {
+        let residuals = problem.design.residuals(parameters);
+        let scatter = scatter(problem, screen, &residuals);
+        let list = &problem.points.list;
+        let standard = |i: usize| {
+            if weights[i] > 0.0 {
+                (residuals[i] / scatter[problem.group_of(i)]).clamp(-4.0, 4.0)
+            } else {
+                f64::NAN
+            }
+        };
+        Self::new((0..list.len()).map(standard).collect(), list.iter().map(|p| p.block).collect())
+    }
+
+    /// The autocorrelation at a lag.
+    ///
+    /// The sum of the products is divided by that of the squares of all values, not by its own count (the biased estimator: M. B.
+    /// Priestley, Spectral Analysis and Time Series, Academic Press 1981, section 5.3.3). Divided by its count, a lag that only a few
+    /// long blocks reach takes any value, also −1.
+    fn autocorrelation(&self, lag: usize) -> f64 {
+        if !(self.square > 0.0) {
+            return if lag == 0 { 1.0 } else { 0.0 };
+        }
+        let (values, block) = (&self.values, &self.block);
+        let pairs = values.iter().zip(block).zip(values.iter().zip(block).skip(lag));
+        let products = pairs.filter(|((_, a), (_, b))| a == b).map(|((x, _), (y, _))| x * y);
+        products.filter(|p| p.is_finite()).sum::<f64>() / self.square
+    }
+
+    /// `1 + 2 Σ ρ_l`, summed until `ρ` falls below a twentieth.
+    fn correlation_time(&self) -> f64 {
+        let lags = (1..400).map(|lag| self.autocorrelation(lag));
+        1.0 + 2.0 * lags.take_while(|rho| *rho >= 0.05).sum::<f64>()
+    }
 }
 
 /// Stretches of half-strokes, at least four correlation times long where the half-stroke is.
@@ -218,10 +240,11 @@ mod tests {
             }
         }));
         block.extend([100; 60]);
-        let far = autocorrelation(&values, &block, 50);
+        let residuals = Residuals::new(values, block);
+        let far = residuals.autocorrelation(50);
         assert!(far < 0.0 && far > -0.2, "{far}");
-        assert!((autocorrelation(&values, &block, 0) - 1.0).abs() < 1e-12);
-        assert!((0..70).all(|lag| autocorrelation(&values, &block, lag).abs() <= 1.0));
+        assert!((residuals.autocorrelation(0) - 1.0).abs() < 1e-12);
+        assert!((0..70).all(|lag| residuals.autocorrelation(lag).abs() <= 1.0));
     }
 
     #[test]
@@ -233,11 +256,11 @@ mod tests {
         };
         let white: Vec<f64> = (0..4000).map(|_| draw()).collect();
         let one = vec![0; 4000];
-        assert!(correlation_time(&white, &one) < 1.3);
+        assert!(Residuals::new(white, one).correlation_time() < 1.3);
         // Half-strokes of 20 points with one error each: a point is worth a twentieth.
         let steps: Vec<f64> = (0..200).flat_map(|_| [draw(); 20]).collect();
         let block: Vec<u32> = (0..200).flat_map(|b| [b; 20]).collect();
-        let time = correlation_time(&steps, &block);
+        let time = Residuals::new(steps, block).correlation_time();
         assert!((18.0..21.0).contains(&time), "{time}");
     }
 }

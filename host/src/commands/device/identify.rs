@@ -9,7 +9,7 @@ use crate::commands::port::PortOption;
 use crate::console::Console;
 use crate::documents::{device::Regulator, text};
 use pam_data::error::{DataCode, Error, Result};
-use pam_device::regulator;
+use pam_device::regulator::{self, Found};
 
 /// Arguments of `host device identify`.
 #[derive(Debug, Args)]
@@ -31,17 +31,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let (low, high) = (arguments.low, arguments.high);
-    if !(low >= 20.0 && high - low >= 30.0 && high.is_finite()) {
-        return Err(Error::new(DataCode::CallInvalid, "these pressures cannot identify a regulator")
-            .value(format!("--low {low} --high {high}"))
-            .help("the lower must be at least 20 kPa, and the upper at least 30 kPa above it"));
-    }
+    let [low_pa, high_pa] = regulator_steps(arguments.low, arguments.high)?;
     let interrupted = interrupts()?;
     let mut client = arguments.port.connect(console)?;
     console.note("the muscle is pressurised for some ten seconds of the device's time, then vented");
     let stop = || interrupted.load(Ordering::Relaxed);
-    let found = regulator::identify_whole(&mut client, low * 1e3, high * 1e3, &stop)?;
+    let found = regulator::identify_whole(&mut client, low_pa, high_pa, &stop)?;
     if !arguments.dry_run {
         found.keep(&mut client)?;
         console.note("saved in the settings; from now on, lag and line are compensated");
@@ -61,23 +56,43 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         })?);
         return Ok(());
     }
-    console.result(format!("gain      {:8.4}", found.gain));
-    console.result(format!("offset    {:8.2} kPa", found.offset_pa * 1e-3));
-    console.result(format!("lag       {:8.1} ms", found.lag_s * 1e3));
-    console.result(if found.line_s > 0.0 {
+    console.result(regulator_text(&found));
+    Ok(())
+}
+
+/// The pressures of the steps in Pa, from kPa.
+///
+/// # Errors
+/// Pressures at which a regulator does not show itself.
+pub(crate) fn regulator_steps(low: f64, high: f64) -> Result<[f64; 2]> {
+    if !(low >= 20.0 && high - low >= 30.0 && high.is_finite()) {
+        return Err(Error::new(DataCode::CallInvalid, "these pressures cannot identify a regulator")
+            .value(format!("--low {low} --high {high}"))
+            .help("the lower must be at least 20 kPa, and the upper at least 30 kPa above it"));
+    }
+    Ok([low * 1e3, high * 1e3])
+}
+
+/// A regulator as text, a line for each number.
+pub(crate) fn regulator_text(found: &Found) -> String {
+    let line = if found.line_s > 0.0 {
         format!("line      {:8.1} ms to fill the muscle at rest length", found.line_s * 1e3)
     } else {
         "line      none seen beside the lag".to_owned()
-    });
-    console.result(format!(
-        "rate      {:8.2} MPa/s{}",
-        found.rate_pa_per_s * 1e-6,
-        if found.rate_limited { ", the regulator's limit" } else { " seen; the limit lies above" }
-    ));
-    console.result(match found.deadband_pa {
+    };
+    let limit = if found.rate_limited { ", the regulator's limit" } else { " seen; the limit lies above" };
+    let deadband = match found.deadband_pa {
         Some(half) => format!("deadband  {half:8.0} Pa to either side"),
         None => "deadband  not seen: not even the largest square of pressure was answered".to_owned(),
-    });
-    console.result(format!("misfit    {:8.0} Pa rms between the steps and this model", found.misfit_pa));
-    Ok(())
+    };
+    [
+        format!("gain      {:8.4}", found.gain),
+        format!("offset    {:8.2} kPa", found.offset_pa * 1e-3),
+        format!("lag       {:8.1} ms", found.lag_s * 1e3),
+        line,
+        format!("rate      {:8.2} MPa/s{limit}", found.rate_pa_per_s * 1e-6),
+        deadband,
+        format!("misfit    {:8.0} Pa rms between the steps and this model", found.misfit_pa),
+    ]
+    .join("\n")
 }

@@ -1,5 +1,7 @@
 //! One connected controller: its requests, its telemetry to the page and to a recording.
 
+mod set_up;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -7,15 +9,13 @@ use std::time::{Duration, Instant};
 
 use model_core::check;
 use model_core::image;
-use model_core::link::endpoints::{
-    ClearFault, GetFaults, GetSettings, GetStatus, SetSettings, StartMode, Stop,
-};
+use model_core::link::endpoints::{ClearFault, GetFaults, GetSettings, GetStatus, StartMode, Stop};
 use model_core::link::hello::Board;
 use model_core::link::messages::{Event, Side, Start, State, Status, Telemetry};
 use model_core::link::settings::Settings;
 use tokio::sync::broadcast;
 
-use super::super::answers::{Answer, Difference, Ended, Faults, Flashed, StoredSettings};
+use super::super::answers::{Answer, Difference, Ended, Faults, Flashed};
 use super::super::events::{Controller, batch, compared, credible, tell};
 use super::{Order, no_controller, report};
 use crate::change_watch::ChangeWatch;
@@ -26,6 +26,7 @@ use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::error::DeviceCode;
 use pam_device::reachability::Reachability;
 use pam_device::recorder::{self, About, Recorder, serial};
+use pam_device::regulator;
 use pam_device::run::{Plan, Steps, arm, release, vent};
 use pam_device::setpoint_profile::Quantity;
 use pam_device::{Address, Client, Losses, Subscription, Topic, VentLine, messages, table_diff, tables};
@@ -49,6 +50,8 @@ pub struct Connected {
     running: Option<(Quantity, Steps, Option<u64>)>,
     /// A recording, what it says of itself, and what was lost before it began.
     recorder: Option<(Recorder, Run, Losses)>,
+    /// The regulator that was found last, as long as it is not kept.
+    identified: Option<regulator::Found>,
     fault: Option<String>,
     changed: Option<ChangeWatch>,
     batch: Vec<Telemetry>,
@@ -134,6 +137,7 @@ impl Connected {
             emulated,
             running: None,
             recorder: None,
+            identified: None,
             fault: None,
             changed: None,
             batch: Vec::new(),
@@ -274,7 +278,12 @@ impl Connected {
     /// Carries out an order to a connected controller.
     pub(super) fn obey(&mut self, order: Order) -> Result<Answer> {
         match order {
-            Order::Replace(_) | Order::IsConnected(_) | Order::Disconnect => return Err(no_controller()),
+            Order::Replace(_) | Order::IsConnected(_) | Order::Disconnect | Order::Identify(..) => {
+                return Err(no_controller());
+            }
+            Order::Signals => return self.signals(),
+            Order::Calibrate(sensor, pairs, keep) => return self.calibrate(sensor, &pairs, keep),
+            Order::KeepRegulator => return self.keep_regulator(),
             Order::Arm => {
                 arm(&mut self.client)?;
                 self.status = self.client.call::<GetStatus>(&())?;
@@ -338,25 +347,6 @@ impl Connected {
             }
         }
         Ok(Answer::Done)
-    }
-
-    fn settings(&mut self, changes: &[String]) -> Result<Answer> {
-        let mut settings = self.client.call::<GetSettings>(&())?;
-        if !changes.is_empty() {
-            for change in changes {
-                settings = crate::commands::device::changed(settings, change)?;
-            }
-            let kept = self.client.call_once::<SetSettings>(&settings)?;
-            let read = self.client.call::<GetSettings>(&())?;
-            if kept != settings || read != settings {
-                return Err(Error::new(
-                    DeviceCode::DeviceVerify,
-                    "the settings read back from the device differ from those sent",
-                ));
-            }
-        }
-        self.settings = settings;
-        Ok(Answer::Settings(Box::new(StoredSettings { stored: settings, defaults: Settings::default() })))
     }
 
     fn difference(&mut self, path: &std::path::Path) -> Result<Answer> {

@@ -21,6 +21,7 @@ pub(super) fn assign(path: &Path, sample: &Sample) -> Guess {
         whole: sample.whole,
         header: sample.has_header,
         sheet: sample.sheet.clone(),
+        checks: sample.notes.clone(),
         ..Guess::default()
     };
     if let Some(layout) = &sample.layout {

@@ -10,6 +10,7 @@ use crate::date::time_stamp;
 use crate::error::{DataCode, Error, Result};
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
+use crate::recording::mcap::Needed;
 use crate::recording::source;
 #[cfg(feature = "excel")]
 use crate::recording::workbook;
@@ -123,6 +124,8 @@ pub(super) struct Sample {
     pub rows: usize,
     /// Whether these are all rows.
     pub whole: bool,
+    /// How the columns of a container were made.
+    pub notes: Vec<String>,
 }
 
 impl Sample {
@@ -135,8 +138,8 @@ impl Sample {
         }
         match Container::of(&source.magic) {
             Some(container) => {
-                let table = container::columns(path, container, &mut source)?;
-                Ok(Self::of_columns(&table))
+                let (table, notes) = container::columns(path, container, &mut source, Needed::default())?;
+                Ok(Self { notes, ..Self::of_columns(&table) })
             }
             #[cfg(feature = "excel")]
             None if workbook::is_one(&source.magic) => {
