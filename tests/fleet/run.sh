@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs the workflow of examples/fleet with Snakemake on this machine, its dry run on Slurm, and the queries of the book's page on fleets.
-# With PAM_LONG=1, also a batch in a bucket of an S3 server on this machine.
+# With PAM_LONG=1, also batches in buckets of an S3 server and an Azure server on this machine.
 #
 #     bash tests/fleet/run.sh [FOLDER]      FOLDER holds the programs `host` and `virtual-bench`; by default they are built,
 #                                           with PAM_LONG=1 with the feature `buckets`
@@ -58,4 +58,9 @@ grep -Eq "^shard +4" slurm.log
 echo "fleet: workflow, dry run on Slurm and queries of the book: 3 passed, 0 failed"
 if [ -n "${PAM_LONG:-}" ]; then
     "$python" "$here/buckets.py" "$programs/host" "$programs/virtual-bench"
+    if command -v npx > /dev/null; then
+        "$python" "$here/buckets_azure.py" "$programs/host" "$programs/virtual-bench"
+    else
+        echo "tests/fleet/run.sh: skipped: Azure: npm is missing" >&2
+    fi
 fi

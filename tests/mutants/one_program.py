@@ -13,6 +13,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -28,8 +29,12 @@ pub fn change_in_force() -> u32 {{
     *CHOSEN.get_or_init(|| std::env::var("{VARIABLE}").ok().and_then(|text| text.parse().ok()).unwrap_or(0))
 }}
 """
-# The tests take seconds. A change that makes them take this long does not end, or hardly.
+# The tests take seconds. A change that makes them compute this long does not end, or hardly. Time of the processor: the machine may be
+# busy. Tests that wait without end are given up after ten times as long.
 PATIENCE_S = 60
+# The whole program is built in minutes. A constant whose loop does not end never ends in the compiler: by its own lint
+# (`long_running_const_eval`, off here with all lints) that is an error.
+BUILD_PATIENCE_S = 600
 # Parts of the names of tests that take seconds, by their module. They run last, on changes of their module that the others do not notice.
 LATE = {"health": ["correlated_noise"], "watch": ["watch::tests::calm"], "store": ["loses_power", "lose_power"]}
 # What is no code: comments, strings, characters (but no lifetimes).
@@ -44,6 +49,17 @@ def listed(root):
     if run.returncode:
         sys.exit(f"`cargo mutants` does not list its changes; install it with `cargo install --locked cargo-mutants`:\n{run.stderr}")
     return [mutant | {"id": number} for number, mutant in enumerate(json.loads(run.stdout), 1)]
+
+
+def ended(command, **options):
+    """Runs a command; None if it had to be stopped, with all that it started."""
+    with subprocess.Popen(command, start_new_session=True, **options) as child:
+        try:
+            stdout, stderr = child.communicate(timeout=BUILD_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            return None
+    return subprocess.CompletedProcess(command, child.returncode, stdout, stderr)
 
 
 class Source:
@@ -134,7 +150,7 @@ class Program:
         self.mutants = mutants
         self.not_built, self.alone, self.tests = set(), [], {}
         # Names of functions that constants need.
-        self.constant = set()
+        self.constant, self.needed = set(), set()
 
     def build(self):
         """Builds the program; what does not compile is left out and tried again without."""
@@ -167,7 +183,10 @@ class Program:
 
     def compile(self):
         """Builds the tests; files and lines of the errors if they cannot be built."""
-        run = subprocess.run([*BUILD, "--no-run", "--message-format=json"], cwd=self.place, env=self.environment, capture_output=True, text=True)
+        command = [*BUILD, "--no-run", "--message-format=json"]
+        run = ended(command, cwd=self.place, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        if run is None:
+            return [("the compiler does not end", 0)]
         messages = [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
         if run.returncode == 0:
             built = {one["target"]["name"]: one["executable"] for one in messages if one.get("executable")}
@@ -201,9 +220,10 @@ class Program:
             for crate in crates:
                 folder = self.place / crate.replace("_", "-")
                 environment = self.environment | {VARIABLE: str(number), "CARGO_MANIFEST_DIR": str(folder)}
-                command = [self.tests[crate], "-q", "--test-threads=1", *chosen]
+                limited = ["sh", "-c", f'ulimit -t {PATIENCE_S} && exec "$0" "$@"']
+                command = [*limited, self.tests[crate], "-q", "--test-threads=1", *chosen]
                 try:
-                    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, timeout=PATIENCE_S)
+                    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, timeout=10 * PATIENCE_S)
                 except subprocess.TimeoutExpired:
                     return "caught"
                 if run.returncode:

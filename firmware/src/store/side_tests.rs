@@ -90,6 +90,7 @@ fn the_longest_image_fits() {
     let longest = [7; image::MAX_LEN];
     store.commit(Side::Agonist, &longest).expect("room");
     assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&longest[..]));
+    assert_eq!(store.put_bytes(0x20, &[7; image::MAX_LEN + 32]), Err(StoreFault::Full), "no room is wasted");
 }
 
 #[test]

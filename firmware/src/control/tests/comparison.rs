@@ -4,7 +4,7 @@ use model_core::link::messages::HealthSums;
 
 use super::tracking::frictionless;
 use super::*;
-use crate::health::BLOCK_TICKS;
+use crate::health::{BLOCK_TICKS, SAMPLE_TICKS};
 
 /// Pressure at which the table's force is large enough to be compared, Pa.
 const STANDS_PA: f32 = 300e3;
@@ -51,4 +51,19 @@ fn a_load_cell_is_compared_only_on_the_muscles_of_a_mode_that_controls() {
     assert_eq!(blocks(true, |controller| assert_eq!(controller.arm(OWNER), Ok(()))), none, "armed");
     assert_eq!(blocks(true, runs(Mode::Vent)), none, "venting");
     assert_eq!(blocks(false, runs(Mode::Pressure)), none, "without a load cell");
+}
+
+#[test]
+fn a_block_is_the_mean_of_one_sample_every_sixteen_ticks() {
+    let mut bench = Bench::new(|settings| settings.watch.follow_pa = 1e6);
+    assert_eq!(bench.controller.use_table(Side::Agonist, &frictionless()), Ok(()));
+    runs(Mode::Pressure)(&mut bench.controller);
+    bench.pass_with(2 * u32::from(BLOCK_TICKS), |now, _| {
+        now.pressure_pa += STANDS_PA - now.pressure_pa.round()
+    });
+    let mut sums = HealthSums::default();
+    bench.controller.health(Side::Agonist).describe(&mut sums);
+    assert_eq!((sums.blocks, SAMPLE_TICKS), (1, 16));
+    // The first column is one in every sample.
+    assert_eq!((sums.sums[0], sums.weight), (1.0, 1.0));
 }

@@ -119,15 +119,25 @@ fn variables(address: &str) -> &'static str {
     }
 }
 
+/// The variables that name a server of one's own, and allow one that is not encrypted; and whose servers are used without them.
+fn endpoint(address: &str) -> (&'static str, &'static str, &'static str) {
+    match address.split("://").next() {
+        Some("gs") => ("GOOGLE_BASE_URL", "GOOGLE_ALLOW_HTTP", "Google"),
+        Some("az") => ("AZURE_STORAGE_ENDPOINT", "AZURE_ALLOW_HTTP", "Microsoft"),
+        _ => ("AWS_ENDPOINT", "AWS_ALLOW_HTTP", "Amazon"),
+    }
+}
+
 /// A failure of a bucket: whether the bucket, the credentials, or the connection is at fault, and what to do.
 fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Error {
     let variables = variables(address);
+    let (endpoint, allow_http, owner) = endpoint(address);
     let bucket = Url::parse(address).map_or(address.to_owned(), |url| bucket_of(&url));
     let whole = error.to_string();
     let (cause, help) = match error {
         _ if no_bucket(error) => (
             format!("there is no bucket {bucket}"),
-            "create it, or correct the address; a server of your own is named by AWS_ENDPOINT".to_owned(),
+            format!("create it, or correct the address; a server of your own is named by {endpoint}"),
         ),
         _ if refuses(error) => (
             format!("{bucket} refuses the credentials"),
@@ -136,13 +146,12 @@ fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Erro
         // The client builds no request to such an address.
         _ if whole.contains("http://") && whole.contains("builder error") => (
             "the endpoint is not encrypted".to_owned(),
-            "give an https:// endpoint, or set AWS_ALLOW_HTTP=true for a server in your own network"
-                .to_owned(),
+            format!("give an https:// endpoint, or set {allow_http}=true for a server in your own network"),
         ),
         _ => (
             format!("{bucket} cannot be used: {}", first_line(&whole)),
             format!(
-                "check the network and the endpoint (AWS_ENDPOINT, if it is not Amazon's), and set {variables}"
+                "check the network and the endpoint ({endpoint}, if it is not {owner}'s), and set {variables}"
             ),
         ),
     };
