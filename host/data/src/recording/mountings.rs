@@ -44,18 +44,47 @@ fn held(recording: &Recording) -> Option<f64> {
     (high - low <= SAME_LENGTH).then_some(0.5 * (low + high))
 }
 
-/// What the recording's labels or its file's name call its mounting. A name says it where it ends in the number of a run, as in
-/// `short7_run2.csv`; `None` where nothing says it.
-fn called(recording: &Recording) -> Option<String> {
+/// What separates the parts of a file's name.
+const SEPARATORS: &[char] = &['_', '-', ' '];
+
+/// A file's name that says its mounting: what it calls the mounting, and the number of the run. `None` where it does not end in the number
+/// of a run, as `short7_run2.csv` does.
+fn named(name: &str) -> Option<(String, u64)> {
+    let stem = name.split('.').next().unwrap_or("").to_ascii_lowercase();
+    let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let run = stem[bare.len()..].parse().ok()?;
+    let runs = ["run", "cycle", "repeat", "trial"];
+    let word = runs.iter().find_map(|word| bare.trim_end_matches(SEPARATORS).strip_suffix(word));
+    Some((word.unwrap_or(bare).trim_end_matches(SEPARATORS).to_owned(), run))
+}
+
+/// The number that a file's name begins with, and what follows it, as in `04_short7_run1.csv`.
+fn leading_number(name: &str) -> Option<(u64, &str)> {
+    let rest = name.trim_start_matches(|c: char| c.is_ascii_digit());
+    let bare = rest.trim_start_matches(SEPARATORS);
+    let number = name[..name.len() - rest.len()].parse().ok()?;
+    (bare.len() < rest.len()).then_some((number, bare))
+}
+
+/// Whether the number at the beginning of the names numbers the recordings: it rises with each of them, also where the rest differs in
+/// the number of the run alone. Then it says nothing of the mounting.
+fn are_numbered(recordings: &[Recording]) -> bool {
+    let names: Option<Vec<(u64, &str)>> = recordings.iter().map(|r| leading_number(&r.name)).collect();
+    let names = names.unwrap_or_default();
+    let next_run = |before: &str, after: &str| {
+        named(before).zip(named(after)).is_some_and(|(b, a)| b.0 == a.0 && b.1 < a.1)
+    };
+    names.windows(2).all(|pair| pair[0].0 < pair[1].0)
+        && names.windows(2).any(|pair| next_run(pair[0].1, pair[1].1))
+}
+
+/// What the recording's labels or its file's name call its mounting; `None` where nothing says it.
+fn called(recording: &Recording, numbered: bool) -> Option<String> {
     if !recording.labels.is_empty() {
         return Some(recording.mounting());
     }
-    let stem = recording.name.split('.').next().unwrap_or("").to_ascii_lowercase();
-    let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
-    let separators: &[char] = &['_', '-', ' '];
-    let runs = ["run", "cycle", "repeat", "trial"];
-    let word = runs.iter().find_map(|word| bare.trim_end_matches(separators).strip_suffix(word));
-    (bare.len() < stem.len()).then(|| word.unwrap_or(bare).trim_end_matches(separators).to_owned())
+    let name = leading_number(&recording.name).filter(|_| numbered).map_or(recording.name.as_str(), |n| n.1);
+    named(name).map(|(mounting, _)| mounting)
 }
 
 impl Campaign {
@@ -63,11 +92,12 @@ impl Campaign {
     /// [`SAME_LENGTH`], or where labels or file names call it otherwise. `None` where a recording did not hold its length.
     #[must_use]
     pub fn mountings(&self) -> Option<Vec<usize>> {
+        let numbered = are_numbered(&self.recordings);
         let mut number = 0;
         let mut before: Option<(f64, Option<String>)> = None;
         let mut all = Vec::with_capacity(self.recordings.len());
         for recording in &self.recordings {
-            let (stroke, name) = (held(recording)?, called(recording));
+            let (stroke, name) = (held(recording)?, called(recording, numbered));
             if let Some((last, other)) = &before {
                 let renamed = name.is_some() && other.is_some() && name != *other;
                 number += usize::from((last - stroke).abs() > SAME_LENGTH || renamed);
@@ -134,6 +164,14 @@ mod tests {
         let named = ["short7_run1.csv", "short7_run2.csv", "short9-run1.csv", "short9-run2.csv.gz"]
             .map(|n| run(n, 0.0, times, &[]));
         assert_eq!(of(named.to_vec()), Some(vec![0, 0, 1, 1]));
+        // A number that rises with every recording is no mounting.
+        let numbered = ["08_a_run1.csv", "09_a_run2.csv", "10_b_run1.csv", "11_b_run2.csv"]
+            .map(|n| run(n, 0.0, times, &[]));
+        assert_eq!(of(numbered.to_vec()), Some(vec![0, 0, 1, 1]));
+        let mountings = ["1_run1.csv", "1_run2.csv", "2_run1.csv"].map(|n| run(n, 0.0, times, &[]));
+        assert_eq!(of(mountings.to_vec()), Some(vec![0, 0, 1]));
+        let once = ["1_run1.csv", "2_run1.csv", "3_run1.csv"].map(|n| run(n, 0.0, times, &[]));
+        assert_eq!(of(once.to_vec()), Some(vec![0, 1, 2]));
         // Names without a number say nothing.
         assert_eq!(of(["a.csv", "b.csv"].map(|n| run(n, 0.0, times, &[])).to_vec()), Some(vec![0, 0]));
         let mut moved = run("r.csv", 0.0, times, &[]);
