@@ -145,7 +145,8 @@ fn friction(solution: &Solution, out: &mut Vec<String>) {
             let check = if points.held_lengths().is_empty() {
                 "check the sign of the displacement, and whether force and displacement are synchronous"
             } else {
-                "check the lengths, and whether force and pressure are synchronous"
+                "creep of the bladder looks like this, and `host diagnose -o` writes a table that carries it; otherwise check the lengths, and \
+                 whether force and pressure are synchronous"
             };
             out.push(format!(
                 "k_F is {k:.3} at {:.0} kPa: negative friction is impossible; {check}",
