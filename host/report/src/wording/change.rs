@@ -199,13 +199,13 @@ pub fn not_comparable(n: &NotComparable) -> String {
             percent(*share)
         ),
         NotComparable::Moving => {
-            "sensor-delay, pressure-sensor-lag: not asked of recordings in which length and pressure move together".into()
+            "sensor-delay, pressure-sensor-lag: not identifiable from recordings in which length and pressure move together".into()
         }
         NotComparable::Lengths { recording, share } => {
             format!("`{recording}`: {:.0} % of the rows at lengths that the reference does not have, or where its muscle does not pull", 100.0 * share)
         }
         NotComparable::Strokes => {
-            "gauge-offset, displacement-offset, rig-compliance, end-slip, drift and lags: not asked of strokes at regulated pressures".into()
+            "gauge-offset, displacement-offset, rig-compliance, end-slip, drift and lags: not identifiable from strokes at regulated pressures".into()
         }
     }
 }
