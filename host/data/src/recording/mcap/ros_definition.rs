@@ -65,7 +65,8 @@ impl Definition {
         let mut sections: Vec<(&str, Vec<Unresolved<'_>>)> = vec![(name, Vec::new())];
         for line in text.lines() {
             let line = line.split('#').next().unwrap_or_default().trim();
-            if line.starts_with("====") || line.is_empty() {
+            // A line of `=` stands between the definitions.
+            if line.bytes().all(|b| b == b'=') {
                 continue;
             }
             if let Some(name) = line.strip_prefix("MSG:") {
