@@ -158,6 +158,10 @@ pam_data::criteria! {
     HELD_RESIDUAL: f64 = 0.005, "s_r", "1", Derived("what repeats on benches of this kind");
     /// Rounds in which slack readings join the bounds.
     HELD_BOUND_ROUNDS: usize = 6, "n_bound", "1", Cost;
+    /// How far a held length may be from the one that was set.
+    LENGTH_ERROR: f64 = 1e-3, "delta_L", "m", Derived("a tape measure; the bound of a fit of lengths");
+    /// Lengths that such a search tries over this range, to both sides.
+    LENGTH_STEPS: usize = 17, "n_L", "1", Cost;
     /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
     TABLE_FOLDS: usize = 12, "n_fold", "1", Cost;
     /// Single time constants that the spectrum is tried against.

@@ -8,7 +8,7 @@ use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 use rayon::prelude::*;
 
-use super::criteria::{PULLS, SUPPORT, TABLE_FOLDS};
+use super::criteria::{LENGTH_ERROR, LENGTH_STEPS, PULLS, SUPPORT, TABLE_FOLDS};
 use super::table_fit::{self, Layers, Prepared};
 use crate::valve_pulses;
 
@@ -32,6 +32,9 @@ pub struct UnseenErrors {
     pub without_memory: UnseenError,
     /// Contact and memory.
     pub with_memory: UnseenError,
+    /// The same with the length of each left-out mounting, within [`LENGTH_ERROR`] of the one that was set, that suits its own readings
+    /// best. This is no prediction: it shows how much of the error comes from the lengths. As `with_memory` where runs are left out.
+    pub with_own_length: UnseenError,
     /// The errors without memory of the readings whose pressure another run of the mounting reaches.
     pub supported_without_memory: UnseenError,
     /// And with memory.
@@ -195,8 +198,8 @@ pub fn unseen_by_table(
     let Some(whole) = Prepared::of(&settled, muscle, &vec![true; runs])? else { return Ok(None) };
     let forms =
         [(&settled, Counted::of(&settled, whole.zero)), (recorded, Counted::of(recorded, whole.zero))];
-    let fold = |used: &Vec<bool>| -> Result<[[Both; 3]; 2]> {
-        let mut sums = [[Both::default(); 3]; 2];
+    let fold = |used: &Vec<bool>| -> Result<[[Both; 4]; 2]> {
+        let mut sums = [[Both::default(); 4]; 2];
         let Some(prepared) = Prepared::of(&settled, muscle, used)? else { return Ok(sums) };
         let tables = [prepared.base(), prepared.table(Layers::Contact)?, prepared.table(Layers::Memory)?];
         for (k, table) in tables.iter().enumerate() {
@@ -208,9 +211,15 @@ pub fn unseen_by_table(
                 }
             }
         }
+        for (f, (form, counted)) in forms.iter().enumerate() {
+            sums[f][3] = match left_out {
+                LeftOut::Runs => sums[f][2],
+                LeftOut::Mountings => own_length(&reread(&tables[2])?, form, counted, used)?,
+            };
+        }
         Ok(sums)
     };
-    let parts: Vec<[[Both; 3]; 2]> = left_out.folds(&settled).par_iter().map(fold).collect::<Result<_>>()?;
+    let parts: Vec<[[Both; 4]; 2]> = left_out.folds(&settled).par_iter().map(fold).collect::<Result<_>>()?;
     let form = |f: usize| {
         let counted = &forms[f].1;
         let total = |k: usize, of: fn(&Both) -> Sums| {
@@ -224,6 +233,7 @@ pub fn unseen_by_table(
             base: counted.size(all(0)),
             without_memory: counted.size(all(1)),
             with_memory: counted.size(all(2)),
+            with_own_length: counted.size(all(3)),
             supported_without_memory: counted.size(supported(1)),
             supported_with_memory: counted.size(supported(2)),
             ringing_pct: 100.0 * rings / readings,
@@ -231,6 +241,27 @@ pub fn unseen_by_table(
         }
     };
     Ok(Some([form(0), form(1)]))
+}
+
+/// The errors of the recordings that are not used, with one shift of their length that gives the least.
+fn own_length(table: &TableFile, form: &Campaign, counted: &Counted, used: &[bool]) -> Result<Both> {
+    let mut best: Option<Both> = None;
+    for step in 0..LENGTH_STEPS {
+        let shift = LENGTH_ERROR * (2.0 * step as f64 / (LENGTH_STEPS - 1) as f64 - 1.0);
+        let mut shifted = form.clone();
+        for (recording, _) in shifted.recordings.iter_mut().zip(used).filter(|(_, used)| !**used) {
+            recording.stroke.iter_mut().for_each(|x| *x += shift);
+        }
+        let predicted = predict(table, &shifted)?;
+        let mut both = Both::default();
+        for r in (0..used.len()).filter(|r| !used[*r]) {
+            counted.add(&mut both, form, r, &predicted.recordings[r].force);
+        }
+        if best.is_none_or(|b| both.all.squares < b.all.squares) {
+            best = Some(both);
+        }
+    }
+    Ok(best.unwrap_or_default())
 }
 
 /// What a held length that is wrong by a millimetre changes of the force at settled points that pull, mean absolute, % of the largest

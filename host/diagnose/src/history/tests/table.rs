@@ -74,6 +74,29 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     assert_eq!(settled.with_memory, recorded.with_memory);
 }
 
+/// A mounting that is 0.4 mm from where it is said to be: with the length that suits its readings most of its error is gone.
+#[test]
+fn what_a_wrong_length_adds_to_the_error_of_an_unseen_mounting_is_told_apart() {
+    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
+    let mut campaign = campaign(&TRUTH);
+    let unseen = |campaign: &Campaign| {
+        let errors = unseen_by_table(campaign, campaign, &muscle, LeftOut::Mountings);
+        let [settled, _] = errors.expect("fitted").expect("staircases");
+        (settled.with_memory.rms_pct, settled.with_own_length.rms_pct)
+    };
+    let (right, right_own) = unseen(&campaign);
+    for recording in campaign.recordings.iter_mut().filter(|r| r.name.starts_with("mounting1")) {
+        recording.stroke.iter_mut().for_each(|s| *s += 0.4e-3);
+    }
+    let (wrong, wrong_own) = unseen(&campaign);
+    println!("{right} {right_own} {wrong} {wrong_own}");
+    assert!(wrong > 2.0 * right, "a wrong length costs nothing: {right} and {wrong} %");
+    assert!(
+        wrong_own < 0.6 * wrong && right_own <= right,
+        "{wrong_own} of {wrong}, {right_own} of {right} %"
+    );
+}
+
 /// The wall's drive in the fit is that of the round before: a table that is taken too early predicts worse than its own fit.
 #[test]
 fn a_table_predicts_its_recordings_as_well_as_it_was_fitted() {
