@@ -89,7 +89,6 @@ fn what_a_wrong_length_adds_to_the_error_of_an_unseen_mounting_is_told_apart() {
         recording.stroke.iter_mut().for_each(|s| *s += 0.4e-3);
     }
     let (wrong, wrong_own) = unseen(&campaign);
-    println!("{right} {right_own} {wrong} {wrong_own}");
     assert!(wrong > 2.0 * right, "a wrong length costs nothing: {right} and {wrong} %");
     assert!(
         wrong_own < 0.6 * wrong && right_own <= right,
