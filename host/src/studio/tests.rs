@@ -296,17 +296,8 @@ fn the_path_of_a_vent_only_vents_and_only_for_the_page() {
 #[test]
 fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhile() {
     run(async {
-        let mut studio = Studio::new();
-        let spec = BenchSpec::laboratory(muscle("mini").unwrap(), 2);
-        let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm: 0.4, frequency_hz: 0.5 };
-        let device = Emulated::start(Stand::new(spec, motion), Some(Kind::Native), 3.0).unwrap();
-        let patience = Patience { answer: HOPELESS, slow_answer: HOPELESS, ..Patience::default() };
-        let client = Client::connect(Port::open(device.address()).unwrap(), patience).unwrap();
-        let connected = Connected::new(device.address().clone(), client, None).unwrap();
-        studio.shared.order(Order::Replace(Box::new(connected))).await.unwrap();
         // Three times as fast as the clock, a busy machine would soon be called silent.
-        let set = vec!["watch.autonomous=true".to_owned()];
-        studio.shared.post(Posted::Settings { set }).await.unwrap();
+        let (mut studio, _device) = with_a_bench(0.4, 3.0).await;
         let watch = |reference| studio.shared.post(Posted::Watch { reference });
         assert!(watch(Compared::Recordings).await.unwrap_err().cause().contains("no recordings"));
         studio.shared.post(Posted::Arm).await.unwrap();
@@ -324,11 +315,12 @@ fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhil
     });
 }
 
-/// A studio with an emulated controller whose bench does not move.
-async fn with_a_still_bench(speed: f64) -> (Studio, Emulated) {
+/// A studio with an emulated controller that runs without its host, and whose bench moves with this amplitude, so many times as fast as the
+/// clock.
+async fn with_a_bench(amplitude_mm: f64, speed: f64) -> (Studio, Emulated) {
     let studio = Studio::new();
     let spec = BenchSpec::laboratory(muscle("mini").unwrap(), 2);
-    let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm: 0.0, frequency_hz: 0.5 };
+    let motion = Motion::Sine { mean_mm: 0.6, amplitude_mm, frequency_hz: 0.5 };
     let device = Emulated::start(Stand::new(spec, motion), Some(Kind::Native), speed).unwrap();
     let patience = Patience { answer: HOPELESS, slow_answer: HOPELESS, ..Patience::default() };
     let client = Client::connect(Port::open(device.address()).unwrap(), patience).unwrap();
@@ -354,7 +346,7 @@ async fn stored(studio: &Studio, place: &str) -> f64 {
 #[test]
 fn the_guide_calibrates_a_sensor_with_known_values() {
     run(async {
-        let (studio, _device) = with_a_still_bench(1.0).await;
+        let (studio, _device) = with_a_bench(0.0, 1.0).await;
         answer(&studio, Posted::Signals).await;
         tokio::time::sleep(Duration::from_millis(300)).await;
         let seen = answer(&studio, Posted::Signals).await;
@@ -390,7 +382,7 @@ fn the_guide_calibrates_a_sensor_with_known_values() {
 #[test]
 fn the_guide_identifies_the_regulator_and_a_vent_ends_it() {
     run(async {
-        let (mut studio, _device) = with_a_still_bench(1.0).await;
+        let (mut studio, _device) = with_a_bench(0.0, 1.0).await;
         assert!(
             studio.shared.post(Posted::KeepRegulator).await.unwrap_err().cause().contains("no regulator")
         );
