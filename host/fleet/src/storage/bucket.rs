@@ -110,28 +110,45 @@ fn begin() -> std::io::Result<Stores> {
     Ok(Stores { runtime, open: HashMap::new() })
 }
 
-/// The variables that hold the credentials of a scheme.
-fn variables(address: &str) -> &'static str {
-    match address.split("://").next() {
-        Some("gs") => "GOOGLE_APPLICATION_CREDENTIALS (a file) or GOOGLE_SERVICE_ACCOUNT_KEY",
-        Some("az") => "AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY",
-        _ => "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_REGION",
-    }
+/// What a provider of buckets calls its settings.
+struct Provider {
+    /// Variables of the credentials.
+    credentials: &'static str,
+    /// Variable of the endpoint, for a server of one's own.
+    endpoint: &'static str,
+    /// Variable that allows an endpoint that is not encrypted.
+    allow_http: &'static str,
+    /// Whose servers are used without an endpoint.
+    owner: &'static str,
 }
 
-/// The variables that name a server of one's own, and allow one that is not encrypted; and whose servers are used without them.
-fn endpoint(address: &str) -> (&'static str, &'static str, &'static str) {
+/// The provider of an address, by its scheme.
+fn provider(address: &str) -> Provider {
     match address.split("://").next() {
-        Some("gs") => ("GOOGLE_BASE_URL", "GOOGLE_ALLOW_HTTP", "Google"),
-        Some("az") => ("AZURE_STORAGE_ENDPOINT", "AZURE_ALLOW_HTTP", "Microsoft"),
-        _ => ("AWS_ENDPOINT", "AWS_ALLOW_HTTP", "Amazon"),
+        Some("gs") => Provider {
+            credentials: "GOOGLE_APPLICATION_CREDENTIALS (a file) or GOOGLE_SERVICE_ACCOUNT_KEY",
+            endpoint: "GOOGLE_BASE_URL",
+            allow_http: "GOOGLE_ALLOW_HTTP",
+            owner: "Google",
+        },
+        Some("az") => Provider {
+            credentials: "AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY",
+            endpoint: "AZURE_STORAGE_ENDPOINT",
+            allow_http: "AZURE_ALLOW_HTTP",
+            owner: "Microsoft",
+        },
+        _ => Provider {
+            credentials: "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_REGION",
+            endpoint: "AWS_ENDPOINT",
+            allow_http: "AWS_ALLOW_HTTP",
+            owner: "Amazon",
+        },
     }
 }
 
 /// A failure of a bucket: whether the bucket, the credentials, or the connection is at fault, and what to do.
 fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Error {
-    let variables = variables(address);
-    let (endpoint, allow_http, owner) = endpoint(address);
+    let Provider { credentials, endpoint, allow_http, owner } = provider(address);
     let bucket = Url::parse(address).map_or(address.to_owned(), |url| bucket_of(&url));
     let whole = error.to_string();
     let (cause, help) = match error {
@@ -141,7 +158,7 @@ fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Erro
         ),
         _ if refuses(error) => (
             format!("{bucket} refuses the credentials"),
-            format!("set {variables} to those of an account that may list, read and write this bucket"),
+            format!("set {credentials} to those of an account that may list, read and write this bucket"),
         ),
         // The client builds no request to such an address.
         _ if whole.contains("http://") && whole.contains("builder error") => (
@@ -151,7 +168,7 @@ fn explained(address: &str, code: DataCode, error: &object_store::Error) -> Erro
         _ => (
             format!("{bucket} cannot be used: {}", first_line(&whole)),
             format!(
-                "check the network and the endpoint ({endpoint}, if it is not {owner}'s), and set {variables}"
+                "check the network and the endpoint ({endpoint}, if it is not {owner}'s), and set {credentials}"
             ),
         ),
     };
