@@ -315,8 +315,8 @@ fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhil
     });
 }
 
-/// A studio with an emulated controller that runs without its host, and whose bench moves with this amplitude, so many times as fast as the
-/// clock.
+/// A studio with an emulated controller that runs without its host. Its bench moves with this amplitude, in a clock that is faster than the
+/// wall clock by `speed`.
 async fn with_a_bench(amplitude_mm: f64, speed: f64) -> (Studio, Emulated) {
     let studio = Studio::new();
     let spec = BenchSpec::laboratory(muscle("mini").unwrap(), 2);
