@@ -36,9 +36,6 @@ def made(bench: Path, folder: Path, rows: int) -> tuple[list[Path], int, float]:
 def main() -> None:
     most = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     programs = environment.built()
-    subprocess.run(
-        ["cargo", "build", "--release", "--quiet", "--package", "virtual-bench"], cwd=environment.ROOT, check=True
-    )
     lines, costs, same = list(COSTS), {}, True
     with tempfile.TemporaryDirectory() as place:
         for rows in (30_000, most // 10, most):

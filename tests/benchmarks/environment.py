@@ -25,7 +25,7 @@ def enter() -> None:
     os.execv(python, [str(python), *sys.argv])
 
 
-def built(*arguments: str) -> Path:
-    """Builds `host` in release mode and returns its folder."""
-    subprocess.run(["cargo", "build", "--release", "--quiet", "--package", "host", *arguments], cwd=ROOT, check=True)
-    return ROOT / "target" / "release"
+def built(*targets: str) -> Path:
+    """Builds targets of the workspace in release mode, all programs if none are given. Returns their folder."""
+    subprocess.run(["cargo", "build", "--release", "--quiet", "--workspace", *(targets or ("--bins",))], cwd=ROOT, check=True)
+    return Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"

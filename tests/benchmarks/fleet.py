@@ -31,7 +31,6 @@ import environment
 environment.enter()
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
 RECORDED = 24
 # Rows of the virtual bench's protocol per muscle and hertz of sampling.
 ROWS_PER_HZ = 596
@@ -41,8 +40,7 @@ FLEET = 10_000
 def programs():
     if len(ARGUMENTS) > 2:
         return Path(ARGUMENTS[2])
-    subprocess.run(["cargo", "build", "--release", "--quiet", "-p", "host", "-p", "virtual-bench"], cwd=ROOT, check=True)
-    return Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
+    return environment.built()
 
 
 def timed(*commands):
