@@ -11,7 +11,7 @@ impl Design {
     /// Gauss–Newton from `parameters`, in place; returns the normal equations at the end.
     ///
     /// A step that raises the objective is halved. It ends when a step would lower the objective by less than a thousand-millionth
-    /// of it, or after `most` steps: what is reached then is still the best so far.
+    /// of it or by less than rounding may move it, or after `most` steps: what is reached then is still the best so far.
     pub fn solve(
         &self,
         parameters: &mut Vec<f64>,
@@ -41,7 +41,8 @@ impl Design {
             let right: Vec<f64> = normal.right.iter().zip(&pull).map(|(b, p)| b - p).collect();
             let mut step = matrix.factor().solve(&right);
             // What the step would gain by the linear model: nothing, where the solution is reached.
-            if !(dot(&step, &right) > 1e-9 * best) {
+            let least = (1e-9 * best).max(penalty.quadratic_rounding(parameters));
+            if !(dot(&step, &right) > least) {
                 break;
             }
             let mut accepted = false;

@@ -149,9 +149,7 @@ fn design(
     order: usize,
 ) -> Design {
     let basis = SplineBasis::new(&pressures.nodes);
-    let columns: Vec<Columns> =
-        points.list.iter().zip(shift).map(|(p, s)| columns(braid, p.stroke + s)).collect();
-    let orthonormal = Orthonormal::over(&spread(points, &columns, &screen.used), order);
+    let orthonormal = Orthonormal::over(&spread(points, shift, braid, &screen.used), order);
     let range = points.pressure;
     let per_bin = if range.span() > 0.0 { BINS as f64 / range.span() } else { 0.0 };
     let mut sums = vec![(0.0, 0.0); BINS + 1];
@@ -174,10 +172,11 @@ fn design(
     let rows = points
         .list
         .iter()
-        .zip(&columns)
-        .map(|(p, c)| {
+        .zip(shift)
+        .map(|(p, shift)| {
             let direction = if directed { p.direction } else { 0.0 };
-            Row::new(p.pressure, p.force, direction, c, &orthonormal, index[raw(p.pressure)])
+            let columns = columns(braid, p.stroke + shift);
+            Row::new(p.pressure, p.force, direction, &columns, &orthonormal, index[raw(p.pressure)])
         })
         .collect();
     Design::new(basis, orthonormal, rows, bins, pressures.levels.len(), directed)
@@ -197,24 +196,24 @@ fn both_directions(points: &Points, screen: &Screen) -> bool {
 
 /// Columns at strokes spread evenly over the tested range, so that the time spent at a stroke does not matter. Strokes that differ by
 /// noise only count once.
-fn spread(points: &Points, columns: &[Columns], used: &[PointUse]) -> Vec<Columns> {
+fn spread(points: &Points, shift: &[f64], braid: &Braid<f64>, used: &[PointUse]) -> Vec<Columns> {
     const PLACES: usize = 400;
     /// Two readings of one length differ by less than this many standard deviations.
     const APART: f64 = 12.0;
     let range = points.stroke;
     let per_place = if range.span() > 0.0 { PLACES as f64 / range.span() } else { 0.0 };
     let mut taken = vec![None; PLACES + 1];
-    for ((p, c), u) in points.list.iter().zip(columns).zip(used) {
+    for ((p, shift), u) in points.list.iter().zip(shift).zip(used) {
         if matches!(u, PointUse::Fitted | PointUse::NearReversal) {
-            taken[((p.stroke - range.low) * per_place) as usize] = Some((p.stroke, *c));
+            taken[((p.stroke - range.low) * per_place) as usize] = Some((p.stroke, *shift));
         }
     }
     let mut last = f64::NEG_INFINITY;
-    let apart = |(stroke, columns): (f64, Columns)| {
+    let apart = |(stroke, shift): (f64, f64)| {
         let far = stroke - last > APART * points.stroke_noise;
         far.then(|| {
             last = stroke;
-            columns
+            columns(braid, stroke + shift)
         })
     };
     taken.into_iter().flatten().filter_map(apart).collect()

@@ -8,8 +8,6 @@
 //! that was read, in proportion to `P − P0`, and at least a tenth of it. Large residuals count in proportion to their size, not to its
 //! square (P. J. Huber, Ann. Math. Statist. 35 (1964) 73, doi 10.1214/aoms/1177703732).
 
-use std::collections::HashMap;
-
 use super::design::Row;
 use super::points::{Point, Range};
 use super::problem::Problem;
@@ -19,6 +17,9 @@ use crate::numerics::median;
 
 /// The model error that is acceptable for control, as a share of the blocked force. Below it more rows do not raise a weight.
 const INEXACT: f64 = 0.002;
+
+/// Chunks of the stroke's range, and of the pressure's where pressure moves.
+const CHUNKS: usize = 64;
 
 /// The weights of all points.
 pub(super) struct Weights {
@@ -38,16 +39,16 @@ impl Weights {
         let chunk = |x: f64, range: Range, n: f64| {
             if range.span() > 0.0 { ((x - range.low) / range.span() * n).min(n - 1.0) as usize } else { 0 }
         };
-        let (fine_p, fine_x) = (if held { 1.0 } else { 64.0 }, 64.0);
         let cell = |i: usize, p: &Point| {
-            let place = if held { problem.group_of(i) } else { chunk(p.pressure, pressure, fine_p) };
+            let place = if held { problem.group_of(i) } else { chunk(p.pressure, pressure, CHUNKS as f64) };
             let branch = (p.direction + 1.0) as usize;
-            (place * 64 + chunk(p.stroke, stroke, fine_x)) * 3 + branch
+            (place * CHUNKS + chunk(p.stroke, stroke, CHUNKS as f64)) * 3 + branch
         };
-        let mut counts: HashMap<usize, f64> = HashMap::new();
+        let places = if held { problem.design.groups.max(1) } else { CHUNKS };
+        let mut counts = vec![0.0; places * CHUNKS * 3];
         for (i, (p, used)) in points.list.iter().zip(&screen.used).enumerate() {
             if *used == PointUse::Fitted {
-                *counts.entry(cell(i, p)).or_default() += f64::from(p.rows);
+                counts[cell(i, p)] += f64::from(p.rows);
             }
         }
         let force = points.force.high.abs().max(points.force.low.abs());
@@ -57,14 +58,14 @@ impl Weights {
             if *used != PointUse::Fitted {
                 return 0.0;
             }
-            let n = counts.get(&cell(i, p)).copied().unwrap_or(1.0).max(1.0);
+            let n = counts[cell(i, p)].max(1.0);
             // Blocked force is proportional to P − P0: errors are judged against it, pressure by pressure.
             let blocked = force * ((p.pressure - deadband) / scale).clamp(0.1, 1.0);
             f64::from(p.rows) / n / (noise / n + (INEXACT * blocked).powi(2))
         };
         Self {
             values: points.list.iter().zip(&screen.used).enumerate().map(weight).collect(),
-            cells: counts.len().max(1) as f64,
+            cells: counts.iter().filter(|n| **n > 0.0).count().max(1) as f64,
         }
     }
 }

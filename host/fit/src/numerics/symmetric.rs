@@ -63,6 +63,13 @@ impl Symmetric {
         dot(&self.times(x), x)
     }
 
+    /// How far rounding may move [`Symmetric::quadratic`]: much where large terms cancel.
+    #[must_use]
+    pub fn quadratic_rounding(&self, x: &[f64]) -> f64 {
+        let size = |row: &[f64]| row.iter().zip(x).map(|(a, x)| (a * x).abs()).sum::<f64>();
+        f64::EPSILON * self.a.chunks_exact(self.n).zip(x).map(|(row, x)| size(row) * x.abs()).sum::<f64>()
+    }
+
     /// The Cholesky factor; a pivot that rounding has made useless is replaced so that its unknown stays at zero.
     #[must_use]
     pub fn factor(mut self) -> Cholesky {

@@ -85,8 +85,8 @@ impl Search<'_> {
         let mut stroke = 0;
         for end in 0..n {
             // The window is the longest one that ends here and stays within the threshold.
-            window.push(smooth, end);
-            if window.spread(smooth) <= self.scale.threshold {
+            window.push(end, smooth[end]);
+            if window.spread() <= self.scale.threshold {
                 continue;
             }
             let (start, found) = (window.start, self.hold(&mut stroke, window.start, end));
@@ -99,7 +99,7 @@ impl Search<'_> {
                 Found::Round => start + (end - start) / 4,
                 Found::Short => start + 1,
             };
-            while window.start < behind || window.spread(smooth) > self.scale.threshold {
+            while window.start < behind || window.spread() > self.scale.threshold {
                 window.shift();
             }
         }
@@ -208,37 +208,39 @@ enum Found {
 #[derive(Default)]
 struct Window {
     start: usize,
-    lows: VecDeque<usize>,
-    highs: VecDeque<usize>,
+    /// Samples that may become the smallest, with their values, which rise.
+    lows: VecDeque<(usize, f64)>,
+    /// Samples that may become the largest, with their values, which fall.
+    highs: VecDeque<(usize, f64)>,
 }
 
 impl Window {
     /// Takes one more sample in.
-    fn push(&mut self, column: &[f64], i: usize) {
-        while self.lows.back().is_some_and(|k| column[*k] >= column[i]) {
+    fn push(&mut self, i: usize, value: f64) {
+        while self.lows.back().is_some_and(|(_, low)| *low >= value) {
             self.lows.pop_back();
         }
-        while self.highs.back().is_some_and(|k| column[*k] <= column[i]) {
+        while self.highs.back().is_some_and(|(_, high)| *high <= value) {
             self.highs.pop_back();
         }
-        self.lows.push_back(i);
-        self.highs.push_back(i);
+        self.lows.push_back((i, value));
+        self.highs.push_back((i, value));
     }
 
     /// Leaves its first sample out.
     fn shift(&mut self) {
         self.start += 1;
         for list in [&mut self.lows, &mut self.highs] {
-            while list.front().is_some_and(|i| *i < self.start) {
+            while list.front().is_some_and(|(i, _)| *i < self.start) {
                 list.pop_front();
             }
         }
     }
 
     /// Largest minus smallest value.
-    fn spread(&self, column: &[f64]) -> f64 {
+    fn spread(&self) -> f64 {
         match (self.lows.front(), self.highs.front()) {
-            (Some(low), Some(high)) => column[*high] - column[*low],
+            (Some((_, low)), Some((_, high))) => high - low,
             _ => 0.0,
         }
     }
