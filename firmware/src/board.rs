@@ -5,6 +5,8 @@ pub use model_core::link::messages::Signals;
 use model_core::link::messages::{Fault, StartedBy, State};
 use model_core::link::settings::{SensorScale, Settings};
 
+use crate::valves::Valves;
+
 /// Readings of the sensors of one muscle, in SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
@@ -61,6 +63,8 @@ pub struct Outputs {
     pub sides: [Command; 2],
     /// The same as a part of the range of each analogue output, 0 to 1.
     pub levels: [f32; 2],
+    /// What the valves do that are fitted in place of a regulator.
+    pub valves: [Valves; 2],
     /// State of safety, for a status light.
     pub state: State,
     /// The setpoint, for a plant that logs it.
@@ -70,7 +74,13 @@ pub struct Outputs {
 impl Outputs {
     /// Every muscle vented: what a board does before the first step.
     pub const VENT: Self =
-        Self { sides: [Command::VENT; 2], levels: [0.0; 2], state: State::Disarmed, setpoint: 0.0 };
+        Self {
+            sides: [Command::VENT; 2],
+            levels: [0.0; 2],
+            valves: [Valves::Absent; 2],
+            state: State::Disarmed,
+            setpoint: 0.0,
+        };
 }
 
 /// The sensors and regulators of a board, which also keep its time: one return is one control tick.
@@ -112,6 +122,8 @@ pub struct Hardware {
     pub supply: Option<Span>,
     /// Whether the board has an enable input.
     pub enable_input: bool,
+    /// Whether the board has outputs for a pair of on/off valves.
+    pub valve_pair: bool,
     /// Highest command that is ever given to a regulator, Pa.
     pub command_ceiling_pa: f32,
     /// Settings of a new device.
@@ -127,6 +139,7 @@ impl Hardware {
         second_pressure: None,
         supply: None,
         enable_input: false,
+        valve_pair: false,
         command_ceiling_pa: 2e6,
         settings: Settings::DEFAULT,
     };

@@ -10,6 +10,7 @@
 //! | whether the table still describes the muscle | [`health`] |
 //! | sine, trapezoid, chirp, table | [`mod@reference`] |
 //! | lag, limits and scaling of the pressure regulator | [`regulator`] |
+//! | a pair of on/off valves as a regulator | [`valves`] |
 //! | the record of every loop variable | [`trace`] |
 //! | a number in three bytes | [`compact_float`] |
 //! | tables and settings in flash | [`store`] |
@@ -53,4 +54,5 @@ pub mod tasks;
 pub mod tick;
 pub mod trace;
 pub mod update;
+pub mod valves;
 pub mod watch;

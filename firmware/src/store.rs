@@ -9,7 +9,7 @@
 //! | --- | --- |
 //! | 0x10 + side | which slot holds the table in use: [`Selected`], postcard |
 //! | 0x20 + 2·side + slot | image of a table |
-//! | 0x36, 0x34 | [`Settings`](model_core::link::settings::Settings), postcard, and the sum to expect of them (`store/settings.rs`); 0x31 to 0x33 and 0x35 held those of the layouts 2 to 5 |
+//! | 0x37, 0x34 | [`Settings`](model_core::link::settings::Settings), postcard, and the sum to expect of them (`store/settings.rs`); 0x31 to 0x33, 0x35 and 0x36 held those of the layouts 2 to 6 |
 //! | 0x3F | number of the layout, `u16` |
 //! | 0x40 + side | generation of a table, and what its effects remember if it must survive a power cycle: a new table brings its own; postcard |
 //! | 0x50 + n | past fault n of a ring, postcard; 0x5F its next place |
@@ -42,7 +42,7 @@ pub use settings::Kept;
 
 /// Version of the layout. It changes when any kept value has other fields: postcard's bytes do not describe themselves, and a value
 /// of another layout would be read as if it were of this one. Its key changes with it.
-pub const FORMAT: u16 = 6;
+pub const FORMAT: u16 = 7;
 /// Longest item with its key, rounded up to words of a flash of at most 16 bytes.
 const BUFFER: usize = image::MAX_LEN + 16;
 

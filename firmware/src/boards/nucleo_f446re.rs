@@ -12,6 +12,8 @@
 //! | PA5 | D13 | status light LD2, on the board |
 //! | PA4 | A2 | analogue command (DAC 1) to the regulator's 0–10 V stage, whose input takes no current; 1 MΩ to ground |
 //! | PB5 | D4 | dump valve: low opens it, so that a board without power vents; 10 kΩ to ground |
+//! | PB8 | D15 | fill valve of a pair, in place of a regulator: high opens it; 10 kΩ to ground |
+//! | PB9 | D14 | vent valve of a pair: high opens it; 10 kΩ to ground |
 //!
 //! The resistors to ground are part of the circuit: an open wire reads the lowest code, which no sensor gives, and while the chip
 //! starts its pins are open, so that they alone keep the valve open and the command at zero.
@@ -94,6 +96,7 @@ static HARDWARE: Hardware = Hardware {
     second_pressure: Some(VOLTS),
     supply: Some(VOLTS),
     enable_input: true,
+    valve_pair: true,
     command_ceiling_pa: 700e3,
     settings: Settings {
         scales: Scales {
@@ -134,6 +137,7 @@ impl Plant for Muscle {
     async fn exchange(&mut self, outputs: &Outputs) -> Inputs {
         let command = outputs.sides[0];
         outputs::command(outputs.levels[0], command.vent);
+        outputs::valves(outputs.valves[0]);
         outputs::light(self.light.tick(outputs.state));
         let step_us = clock::micros().wrapping_sub(self.began_us);
         if self.stepped {

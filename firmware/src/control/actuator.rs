@@ -11,6 +11,7 @@ use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, Bounds, Law, RegulatorState};
 use crate::signals::{Filters, Sums};
+use crate::valves::{PairOfValves, Valves};
 use crate::watch::{Seen, SideWatch};
 
 /// One muscle at work.
@@ -20,6 +21,8 @@ pub(super) struct Actuator {
     pub(super) motion: MotionTracker<f32>,
     pub(super) watch: SideWatch,
     pub(super) regulator: RegulatorState,
+    /// The valves in place of a regulator.
+    valves: PairOfValves,
     /// What may be demanded of the regulator and commanded, by settings, board and table.
     pub(super) bounds: Bounds,
     pub(super) trim: Integral,
@@ -52,6 +55,7 @@ impl Actuator {
             motion: MotionTracker::new(motion_settings(settings)),
             watch: SideWatch::default(),
             regulator: RegulatorState::default(),
+            valves: PairOfValves::default(),
             bounds,
             trim: Integral::default(),
             stroke_loop: Integral::default(),
@@ -100,6 +104,20 @@ impl Actuator {
         self.regulator.vent(&air, law);
         self.command = Command::VENT;
         self.sample.pressure_demand_pa = 0.0;
+    }
+
+    /// What the valves do with this tick's command, where they are fitted in place of a regulator.
+    #[inline(always)]
+    pub(super) fn valves(&mut self, settings: &Settings) -> Valves {
+        if settings.valves.is_fitted() { self.pulse(settings) } else { Valves::Absent }
+    }
+
+    #[inline(never)]
+    fn pulse(&mut self, settings: &Settings) -> Valves {
+        // Without a reading in this tick nothing is known of the pressure.
+        let measured_pa = if self.readings.is_some() { self.sample.pressure_pa } else { f32::NAN };
+        let air = self.air();
+        self.valves.step(&self.command, measured_pa, &air, settings)
     }
 
     /// Limits by settings, board and table, of which one has changed.

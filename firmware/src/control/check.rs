@@ -7,6 +7,7 @@ use model_core::link::messages::{Field, Refusal};
 use model_core::link::settings::{Joint, Regulator, SensorScale, Settings};
 
 use crate::board::{Hardware, Span};
+use crate::tick::TICK_S;
 
 /// A value and the range that it must be in.
 type Bound = (f32, f32, f32);
@@ -48,7 +49,7 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
         (Field::StrokeLoop, stroke_loop(settings)),
         (Field::Joint, joint(&settings.joint)),
         (Field::Regulator, regulator(&settings.regulator, hardware)),
-        (Field::Command, command(settings)),
+        (Field::Command, command(settings) && valves(settings, hardware)),
         (Field::Limits, limits(settings, hardware)),
         (Field::SensorWatch, sensors(settings, hardware)),
         (Field::Watch, watch(settings, hardware)),
@@ -82,7 +83,7 @@ pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
                     (own.motion_band_m, own.pressure_band_pa);
             }
             Field::Scale => settings.scales = own.scales,
-            Field::Command => settings.command = own.command,
+            Field::Command => (settings.command, settings.valves) = (own.command, own.valves),
             Field::SetPoint | Field::Reference | Field::Rate => *settings = *own,
         }
         repaired = true;
@@ -184,6 +185,31 @@ fn command(settings: &Settings) -> bool {
         && settings.regulator.command_max_pa <= c.full_pa
 }
 
+/// Periods of a pair of valves, ticks: shorter, valves that switch in 1 ms are hardly ever open; longer, no muscle is controlled.
+const PERIODS: core::ops::RangeInclusive<u16> = 4..=50;
+/// The pressure is corrected once in a period, so that its lag is that of two periods at least.
+const LAG_PERIODS: f32 = 2.0;
+/// Longest dead time and shortest pulse, s: valves that need longer are none for pulses.
+const MOST_SWITCHING: f32 = 10e-3;
+
+/// Valves need outputs of the board, and a pressure sensor over which the loop is closed.
+fn valves(settings: &Settings, hardware: &Hardware) -> bool {
+    let v = &settings.valves;
+    let lag_s = LAG_PERIODS * TICK_S * f32::from(v.period_ticks);
+    all(&[
+        (v.supply_pa, 10e3, MOST_PRESSURE),
+        (v.fill_pa_per_s, 1e3, MOST_RATE),
+        (v.vent_pa_per_s, 1e3, MOST_RATE),
+        (v.dead_s, 0.0, MOST_SWITCHING),
+        (v.least_s, 0.0, MOST_SWITCHING),
+        (v.band_pa, 0.0, 100e3),
+    ]) && (!v.is_fitted()
+        || (hardware.valve_pair
+            && settings.pressure.fitted
+            && PERIODS.contains(&v.period_ticks)
+            && settings.regulator.lag_s >= lag_s))
+}
+
 /// A limit beyond what its converter can deliver would never be crossed.
 fn limits(settings: &Settings, hardware: &Hardware) -> bool {
     let l = &settings.limits;
@@ -269,7 +295,7 @@ mod tests {
     fn the_defaults_can_be_used_and_no_field_takes_what_is_no_number_or_has_no_bound() {
         assert_eq!(refused(|_| ()), None);
         type Set = fn(&mut Settings, f32);
-        let fields: [(Field, Set); 47] = [
+        let fields: [(Field, Set); 53] = [
             (Field::ForceLoop, |s, v| s.force_loop.proportional_pa_per_n = v),
             (Field::ForceLoop, |s, v| s.force_loop.integral_pa_per_n_s = v),
             (Field::ForceLoop, |s, v| s.force_loop.trim_limit_pa = v),
@@ -317,6 +343,12 @@ mod tests {
             (Field::Command, |s, v| s.command.full_pa = v),
             (Field::Watch, |s, v| s.watch.second_pressure_pa = v),
             (Field::Watch, |s, v| s.watch.supply_low_pa = v),
+            (Field::Command, |s, v| s.valves.supply_pa = v),
+            (Field::Command, |s, v| s.valves.fill_pa_per_s = v),
+            (Field::Command, |s, v| s.valves.vent_pa_per_s = v),
+            (Field::Command, |s, v| s.valves.dead_s = v),
+            (Field::Command, |s, v| s.valves.least_s = v),
+            (Field::Command, |s, v| s.valves.band_pa = v),
         ];
         for (at, (field, set)) in fields.into_iter().enumerate() {
             for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3.4e38, 1e30, -1e30] {

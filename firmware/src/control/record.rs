@@ -7,12 +7,18 @@ use super::{Controller, Notice};
 use crate::board::Outputs;
 use crate::outbox::{SIDES, Sample};
 use crate::pair;
+use crate::valves::Valves;
 
 impl Controller {
     pub(super) fn record(&mut self) -> Outputs {
         for side in &mut self.sides {
             side.sample.command_pa = if side.command.vent { 0.0 } else { side.command.pressure_pa };
         }
+        let settings = &self.settings;
+        let [first, second] = &mut self.sides;
+        // A board for one muscle has no second output.
+        let second = if pair::SUPPORTED { second.valves(settings) } else { Valves::Absent };
+        let valves = [first.valves(settings), second];
         let Self { trace, sides, machine, tick, setpoint, step_us, .. } = self;
         let state = machine.state();
         let full = trace.sample(*tick, |variable| value_of(variable, sides, state, *setpoint, *step_us));
@@ -30,6 +36,7 @@ impl Controller {
                     0.0
                 },
             ],
+            valves,
             state,
             setpoint: if self.mode == Mode::Force { self.setpoint } else { self.sides[0].force_demand_n },
         }

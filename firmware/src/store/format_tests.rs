@@ -87,24 +87,29 @@ fn what_this_format_wrote_is_read_and_written_alike() {
 #[test]
 fn settings_of_older_formats_are_taken_over_field_by_field() {
     let formats = [
-        (include_str!("fixtures/format-2.txt"), 0.0, 77, 7_777),
-        (include_str!("fixtures/format-3.txt"), 4.5e-3, 77, 7_777),
-        (include_str!("fixtures/format-4.txt"), 4.5e-3, 10_000, 7_777),
-        (include_str!("fixtures/format-5.txt"), 4.5e-3, 10_000, 60_000),
+        (include_str!("fixtures/format-2.txt"), 0.0, 77, 7_777, 7.0),
+        (include_str!("fixtures/format-3.txt"), 4.5e-3, 77, 7_777, 7.0),
+        (include_str!("fixtures/format-4.txt"), 4.5e-3, 10_000, 7_777, 7.0),
+        (include_str!("fixtures/format-5.txt"), 4.5e-3, 10_000, 60_000, 7.0),
+        (include_str!("fixtures/format-6.txt"), 4.5e-3, 10_000, 60_000, 1.0),
     ];
-    for (fixture, line_s, hold_ticks, armed_silence_ticks) in formats {
+    for (fixture, line_s, hold_ticks, armed_silence_ticks, per_unit) in formats {
         let mut store = open(flash_of(fixture));
         let mut settings = Settings::default();
         settings.watch.hold_ticks = 77;
         settings.watch.armed_silence_ticks = 7_777;
         settings.scales.force.per_unit = 7.0;
         settings.command.full_pa = 777e3;
+        settings.watch.supply_low_pa = 77.0;
+        settings.valves.supply_pa = 777e3;
         assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
         assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (line_s, 1_234.0));
         assert_eq!(settings.watch.hold_ticks, hold_ticks);
         assert_eq!(settings.watch.armed_silence_ticks, armed_silence_ticks);
         // Older firmware had the scales of its board.
-        assert_eq!((settings.scales.force.per_unit, settings.command.full_pa), (7.0, 777e3));
+        let (full_pa, supply_low_pa) = if per_unit == 1.0 { (2e6, 0.0) } else { (777e3, 77.0) };
+        assert_eq!((settings.scales.force.per_unit, settings.command.full_pa), (per_unit, full_pa));
+        assert_eq!((settings.watch.supply_low_pa, settings.valves.supply_pa), (supply_low_pa, 777e3));
         assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
         assert_eq!(store.past_fault(0), Ok(Some(report())));
         assert_eq!(store.count_start(), Ok(2));
@@ -120,6 +125,7 @@ fn a_migration_that_loses_power_leaves_the_older_settings_or_the_new() {
         include_str!("fixtures/format-3.txt"),
         include_str!("fixtures/format-4.txt"),
         include_str!("fixtures/format-5.txt"),
+        include_str!("fixtures/format-6.txt"),
     ] {
         let mut store = open(flash_of(fixture));
         let mut settings = Settings::default();
@@ -137,11 +143,11 @@ fn a_migration_that_loses_power_leaves_the_older_settings_or_the_new() {
 /// Every bit of settings of the layout before: a wrong one is noticed there, too.
 #[test]
 fn settings_of_the_layout_before_of_which_a_bit_is_wrong_are_not_trusted() {
-    let flash = flash_of(include_str!("fixtures/format-5.txt"));
+    let flash = flash_of(include_str!("fixtures/format-6.txt"));
     let mut store = open(flash.clone());
     let mut settings = Settings::default();
     assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
-    let bytes = store.bytes(0x35).expect("readable").expect("kept").to_vec();
+    let bytes = store.bytes(0x36).expect("readable").expect("kept").to_vec();
     let place = flash.bytes.windows(bytes.len()).position(|w| w == bytes).expect("they are there");
     for bit in 0..8 * bytes.len() {
         let mut damaged = flash.clone();
@@ -191,10 +197,10 @@ fn settings_that_are_gone_or_of_a_newer_layout_are_not_trusted() {
 /// Whole settings of the layout before, which are not those that were last confirmed: limits of long ago, for instance.
 #[test]
 fn settings_of_the_layout_before_that_the_seal_does_not_name_are_not_trusted() {
-    let mut store = open(flash_of(include_str!("fixtures/format-5.txt")));
-    let mut bytes = store.bytes(0x35).expect("readable").expect("kept").to_vec();
+    let mut store = open(flash_of(include_str!("fixtures/format-6.txt")));
+    let mut bytes = store.bytes(0x36).expect("readable").expect("kept").to_vec();
     *bytes.last_mut().expect("a byte") ^= 1;
-    store.put_bytes(0x35, &bytes).expect("room");
+    store.put_bytes(0x36, &bytes).expect("room");
     let mut settings = Settings::default();
     assert_eq!(store.settings(&mut settings), Ok(Kept::Untrusted));
     assert_eq!(settings, Settings::default());

@@ -14,10 +14,11 @@ use model_core::link::settings::Settings;
 
 use super::{FORMAT, Store};
 
-/// Key of the settings; 0x30 to 0x33 and 0x35 held those of the layouts 1 to 5.
-const SETTINGS: u8 = 0x36;
+/// Key of the settings; 0x30 to 0x33, 0x35 and 0x36 held those of the layouts 1 to 6.
+const SETTINGS: u8 = 0x37;
 const SEAL: u8 = 0x34;
 const LAYOUT: u8 = 0x3F;
+const SETTINGS_6: u8 = 0x36;
 const SETTINGS_5: u8 = 0x35;
 const SETTINGS_4: u8 = 0x33;
 const SETTINGS_3: u8 = 0x32;
@@ -59,7 +60,7 @@ fn sum_of(bytes: Option<&[u8]>) -> u32 {
 struct Older<'s> {
     settings: &'s mut Settings,
     /// Number of the layout: the regulator has a line since 3, a hold and a vent have their watches since 4, an armed device since 5.
-    /// Sensors and command have scales since 6.
+    /// Sensors and command have scales since 6, and further inputs are watched. A pair of valves is possible since 7.
     layout: u16,
 }
 
@@ -79,8 +80,9 @@ impl Fields for Older<'_> {
             hold_on,
             motion_band_m,
             pressure_band_pa,
-            scales: _,
-            command: _,
+            scales,
+            command,
+            valves: _,
         } = &mut *self.settings;
         feed_forward.walk(walk);
         force_loop.walk(walk);
@@ -119,9 +121,18 @@ impl Fields for Older<'_> {
         if self.layout >= 5 {
             watch.armed_silence_ticks.walk(walk);
         }
+        if self.layout >= 6 {
+            watch.second_pressure_pa.walk(walk);
+            watch.supply_low_pa.walk(walk);
+            watch.enable_input.walk(walk);
+        }
         hold_on.walk(walk);
         motion_band_m.walk(walk);
         pressure_band_pa.walk(walk);
+        if self.layout >= 6 {
+            scales.walk(walk);
+            command.walk(walk);
+        }
     }
 }
 
@@ -151,8 +162,13 @@ impl<F: NorFlash> Store<F> {
         if layout.is_some_and(|layout| layout >= FORMAT) {
             return Ok(Kept::Untrusted);
         }
-        // The layouts 4 and 5 have a seal.
-        let last = if self.bytes(SETTINGS_5)?.is_some() { SETTINGS_5 } else { SETTINGS_4 };
+        // The layouts from 4 on have a seal.
+        let mut last = SETTINGS_4;
+        for key in [SETTINGS_5, SETTINGS_6] {
+            if self.bytes(key)?.is_some() {
+                last = key;
+            }
+        }
         let bytes = self.bytes(last)?;
         if bytes.is_none() && (layout.is_some() || (seal.is_some() && !sealed(None))) {
             return Ok(Kept::Untrusted);
@@ -160,7 +176,8 @@ impl<F: NorFlash> Store<F> {
         if bytes.is_some_and(|bytes| !sealed(Some(bytes))) {
             return Ok(Kept::Untrusted);
         }
-        for (key, layout) in [(SETTINGS_5, 5), (SETTINGS_4, 4), (SETTINGS_3, 3), (SETTINGS_2, 2)] {
+        let older = [(SETTINGS_6, 6), (SETTINGS_5, 5), (SETTINGS_4, 4), (SETTINGS_3, 3), (SETTINGS_2, 2)];
+        for (key, layout) in older {
             if let Some(bytes) = self.bytes(key)? {
                 if fields::read(bytes, &mut Older { settings, layout }) {
                     return Ok(Kept::Older);
@@ -181,7 +198,7 @@ impl<F: NorFlash> Store<F> {
         let length = fields::write(settings, &mut room).ok_or(StoreFault::Full)?;
         let bytes = &room[..length];
         let mut before = 0;
-        for key in [SETTINGS_4, SETTINGS_5, SETTINGS] {
+        for key in [SETTINGS_4, SETTINGS_5, SETTINGS_6, SETTINGS] {
             if let Some(bytes) = self.bytes(key)? {
                 before = sum_of(Some(bytes));
             }

@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::fields::{codes, fields};
 
+mod valves;
+
+pub use valves::ValvePair;
+
 codes! {
     /// Where the pressure for a demanded force comes from before any trim.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -320,6 +324,8 @@ pub struct Settings {
     pub scales: Scales,
     /// Signal to the pressure regulator.
     pub command: CommandOutput,
+    /// A pair of on/off valves in place of the regulator.
+    pub valves: ValvePair,
 }
 
 fields!(Settings {
@@ -337,7 +343,8 @@ fields!(Settings {
     motion_band_m,
     pressure_band_pa,
     scales,
-    command
+    command,
+    valves
 });
 
 impl Settings {
@@ -416,6 +423,7 @@ impl Settings {
             supply: SensorScale::SAME,
         },
         command: CommandOutput { low: 0.0, full_pa: 2e6 },
+        valves: ValvePair::NONE,
     };
 }
 

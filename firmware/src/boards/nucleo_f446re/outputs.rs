@@ -1,6 +1,12 @@
-//! What acts on the muscle: the regulator's analogue command and the dump valve.
+//! What acts on the muscle: the regulator's analogue command or a pair of valves, and the dump valve.
+//!
+//! The valves are outputs of TIM4, which counts microseconds and stops at the end of a period (one-pulse mode). A pulse lies at the end of
+//! its period, so that a stopped counter, which is zero, closes the valve: if the program stops, both valves close within the period.
+
+use firmware::valves::Valves;
 
 use super::super::register::Register;
+use super::clock::TIMER_CLOCK_MHZ;
 
 const AHB1ENR: Register = Register::at(0x4002_3830);
 const APB1ENR: Register = Register::at(0x4002_3840);
@@ -13,6 +19,28 @@ const DAC_DHR12R1: Register = Register::at(0x4000_7408);
 const GPIOA_BSRR: Register = Register::at(0x4002_0018);
 /// The converter's highest code.
 const FULL_CODE: f32 = 4095.0;
+
+const GPIOB_AFRH: Register = Register::at(0x4002_0424);
+
+const TIM4: usize = 0x4000_0800;
+const TIM_CR1: Register = Register::at(TIM4);
+const TIM_EGR: Register = Register::at(TIM4 + 0x14);
+const TIM_CCMR2: Register = Register::at(TIM4 + 0x1C);
+const TIM_CCER: Register = Register::at(TIM4 + 0x20);
+const TIM_PSC: Register = Register::at(TIM4 + 0x28);
+const TIM_ARR: Register = Register::at(TIM4 + 0x2C);
+const TIM_CCR3: Register = Register::at(TIM4 + 0x3C);
+const TIM_CCR4: Register = Register::at(TIM4 + 0x40);
+/// Pins of the fill and the vent valve, channels 3 and 4.
+const FILL: u32 = 8;
+const VENT: u32 = 9;
+/// Counts once, and whether it counts.
+const ONE_PULSE: u32 = 1 << 3;
+const COUNTS: u32 = 1;
+/// Modes of the outputs, channel 4 above channel 3: both inactive, only the vent valve active, both active from their compare on (PWM mode 2).
+const BOTH_CLOSED: u32 = 0b100 << 12 | 0b100 << 4;
+const VENT_OPEN: u32 = 0b101 << 12 | 0b100 << 4;
+const PULSES: u32 = 0b111 << 12 | 0b111 << 4;
 
 const VALVE: u32 = 5;
 const LIGHT: u32 = 5;
@@ -27,8 +55,44 @@ pub fn start() {
     GPIOA_MODER.set(0b11 << (2 * 4));
     // The light is an output.
     GPIOA_MODER.write(GPIOA_MODER.read() & !(0b11 << (2 * LIGHT)) | 0b01 << (2 * LIGHT));
+    start_valves();
     // Converter 1 on, without its output buffer (BOFF1): through that it does not come below 0.2 V, which would be 60 kPa.
     DAC_CR.write(1 << 1 | 1 << 0);
+}
+
+/// Both valves closed; their timer stands.
+fn start_valves() {
+    APB1ENR.set(1 << 2);
+    TIM_CCMR2.write(BOTH_CLOSED);
+    TIM_CCER.write(1 << 12 | 1 << 8);
+    let second = |pin: u32| 2 << (4 * (pin - 8));
+    let both = 0b1111 << (4 * (FILL - 8)) | 0b1111 << (4 * (VENT - 8));
+    GPIOB_AFRH.write(GPIOB_AFRH.read() & !both | second(FILL) | second(VENT));
+    let mode = |pin: u32, mode: u32| mode << (2 * pin);
+    let pins = mode(FILL, 0b11) | mode(VENT, 0b11);
+    GPIOB_MODER.write(GPIOB_MODER.read() & !pins | mode(FILL, 0b10) | mode(VENT, 0b10));
+}
+
+/// What the valves do in a tick.
+pub fn valves(valves: Valves) {
+    match valves {
+        Valves::Absent | Valves::Continue => {}
+        Valves::Closed => TIM_CCMR2.write(BOTH_CLOSED),
+        Valves::Vent => TIM_CCMR2.write(VENT_OPEN),
+        Valves::Period { fill_us, vent_us, length_us } => {
+            let length = u32::from(length_us);
+            TIM_CR1.write(ONE_PULSE);
+            TIM_PSC.write(TIMER_CLOCK_MHZ - 1);
+            TIM_ARR.write(length - 1);
+            // Loads the prescaler, and begins at zero.
+            TIM_EGR.write(1);
+            // From 1 on: a stopped counter, which is zero, is before every pulse.
+            TIM_CCR3.write((length - u32::from(fill_us)).max(1));
+            TIM_CCR4.write((length - u32::from(vent_us)).max(1));
+            TIM_CCMR2.write(PULSES);
+            TIM_CR1.write(ONE_PULSE | COUNTS);
+        }
+    }
 }
 
 /// Switches the status light.
@@ -40,6 +104,7 @@ pub fn light(on: bool) {
 pub fn dump() {
     GPIOB_BSRR.write(1 << (16 + VALVE));
     DAC_DHR12R1.write(0);
+    TIM_CCMR2.write(BOTH_CLOSED);
 }
 
 /// Commands a part of the output's range, and the valve open or closed.

@@ -68,6 +68,12 @@ fn loops_joint_and_regulator_have_these_ranges() {
         (Field::Regulator, 1e3, 2e6, |s, v| (s.regulator.command_max_pa, s.command.full_pa) = (v, 5e6)),
         (Field::Command, 10e3, 5e6, |s, v| (s.regulator.command_max_pa, s.command.full_pa) = (1e3, v)),
         (Field::Command, 650e3, 5e6, |s, v| s.command.full_pa = v),
+        (Field::Command, 10e3, 5e6, |s, v| s.valves.supply_pa = v),
+        (Field::Command, 1e3, 1e9, |s, v| s.valves.fill_pa_per_s = v),
+        (Field::Command, 1e3, 1e9, |s, v| s.valves.vent_pa_per_s = v),
+        (Field::Command, 0.0, 10e-3, |s, v| s.valves.dead_s = v),
+        (Field::Command, 0.0, 10e-3, |s, v| s.valves.least_s = v),
+        (Field::Command, 0.0, 100e3, |s, v| s.valves.band_pa = v),
     ]);
 }
 
@@ -157,6 +163,31 @@ fn what_a_board_does_not_have_is_not_watched() {
         assert_eq!(found(&without, |s| change(s, 0.0)), None);
         assert_eq!(found(&with, |s| change(s, least)), None);
     }
+}
+
+#[test]
+fn a_pair_of_valves_needs_outputs_a_pressure_sensor_and_a_lag_of_two_periods() {
+    let with = Hardware { valve_pair: true, ..BOARD };
+    let pair = |ticks: u16, lag_s: f32| {
+        move |settings: &mut Settings| (settings.valves.period_ticks, settings.regulator.lag_s) = (ticks, lag_s)
+    };
+    for ticks in [4, 5, 50] {
+        let lag_s = 2e-3 * f32::from(ticks);
+        assert_eq!(found(&with, pair(ticks, lag_s)), None);
+        assert_eq!(found(&with, pair(ticks, lag_s.next_down())), Some(Field::Command), "{ticks}");
+        assert_eq!(found(&BOARD, pair(ticks, lag_s)), Some(Field::Command), "without outputs");
+        let blind = |s: &mut Settings| {
+            pair(ticks, lag_s)(s);
+            s.pressure.fitted = false;
+        };
+        assert_eq!(found(&with, blind), Some(Field::Command), "without a sensor");
+    }
+    for ticks in [1, 3, 51, u16::MAX] {
+        assert_eq!(found(&with, pair(ticks, 10.0)), Some(Field::Command), "{ticks}");
+    }
+    let mut settings = Settings::DEFAULT;
+    pair(10, 0.1)(&mut settings);
+    assert!(repair_settings(&mut settings, &BOARD) && !settings.valves.is_fitted());
 }
 
 #[test]
