@@ -73,14 +73,13 @@ pub struct Outputs {
 
 impl Outputs {
     /// Every muscle vented: what a board does before the first step.
-    pub const VENT: Self =
-        Self {
-            sides: [Command::VENT; 2],
-            levels: [0.0; 2],
-            valves: [Valves::Absent; 2],
-            state: State::Disarmed,
-            setpoint: 0.0,
-        };
+    pub const VENT: Self = Self {
+        sides: [Command::VENT; 2],
+        levels: [0.0; 2],
+        valves: [Valves::Absent; 2],
+        state: State::Disarmed,
+        setpoint: 0.0,
+    };
 }
 
 /// The sensors and regulators of a board, which also keep its time: one return is one control tick.

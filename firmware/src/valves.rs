@@ -11,7 +11,8 @@
 //! with the critical ratio `b_c` of [`CRITICAL`]. The rates `fill` and `vent` are measured ([`ValvePair`]).
 //!
 //! Valves have no shorter pulse than the least one. What it would have let through is added to the next pulse of the same direction, so that
-//! the mean is kept. The resolution is half of what the least pulse changes. A reading that is not a number closes both.
+//! the mean is kept. The resolution is half of what the least pulse changes. Where the direction changes, the pulse leaves the other valve
+//! time to close. No command, or one that is not a number, vents; a reading that is not a number closes both.
 
 use model_core::link::settings::{Settings, ValvePair};
 use model_core::scalar::Scalar;
@@ -50,13 +51,23 @@ pub enum Valves {
     Vent,
 }
 
-/// What a pair remembers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What a pair remembers. A new one is vented.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairOfValves {
     /// Ticks that remain of the period.
     left: u16,
     /// Time that was too short to open for, s: of the fill valve, or negative of the vent valve.
     carry_s: f32,
+    /// Pulse of the period before, s, signed in the same way: its valve may still be open.
+    before_s: f32,
+    /// Error of pressure while a valve is open as long as it can be, Pa; else zero.
+    limited_pa: f32,
+}
+
+impl Default for PairOfValves {
+    fn default() -> Self {
+        Self { left: 0, carry_s: 0.0, before_s: -1.0, limited_pa: 0.0 }
+    }
 }
 
 /// `ψ`: part of the choked flow at a ratio of pressures behind and before a valve.
@@ -96,9 +107,19 @@ impl PairOfValves {
         let length_s = f32::from(valves.period_ticks) * TICK_S;
         let length_us = valves.period_ticks * TICK_US as u16;
         let open_s = self.open(command.pressure_pa, measured_pa, air, settings, length_s);
+        // A pulse lies at the end of its period: before it there is time for the other valve to close.
+        let most_s = if open_s * self.before_s < 0.0 { length_s - valves.apart_s } else { length_s };
+        let open_s = open_s.within(-most_s, most_s);
+        self.before_s = open_s;
         let time_us = (open_s.abs() * 1e6 + 0.5) as u16;
         let (fill_us, vent_us) = if open_s > 0.0 { (time_us, 0) } else { (0, time_us) };
         Valves::Period { fill_us: fill_us.min(length_us), vent_us: vent_us.min(length_us), length_us }
+    }
+
+    /// Error of pressure of which the valves cannot close more, Pa: integrators behind them must not continue in its direction.
+    #[inline(always)]
+    pub fn limited_pa(&self) -> f32 {
+        self.limited_pa
     }
 
     /// Time for which the signal to a valve is on in this period, s; negative for the vent valve.
@@ -111,25 +132,25 @@ impl PairOfValves {
         length_s: f32,
     ) -> f32 {
         let valves = &settings.valves;
-        let error = command_pa - measured_pa;
-        let widening = (measured_pa + ATMOSPHERE_PA) * air.widening_per_s;
-        let wanted = error / settings.regulator.lag_s + widening;
-        if !wanted.is_finite() {
-            *self = Self { carry_s: 0.0, ..*self };
-            return 0.0;
-        }
-        // No pressure is demanded: a leaking fill valve must not fill the muscle.
+        self.limited_pa = 0.0;
+        // No pressure is demanded: a leaking fill valve must not fill the muscle, whatever its sensor says.
         if !(command_pa > 0.0) {
             self.carry_s = 0.0;
             return -length_s;
         }
-        if error.abs() <= valves.band_pa {
+        let error = command_pa - measured_pa;
+        let widening = (measured_pa + ATMOSPHERE_PA) * air.widening_per_s;
+        let wanted = error / settings.regulator.lag_s + widening;
+        let open_rate = rate(valves, measured_pa, air, wanted > 0.0);
+        let share = wanted / open_rate;
+        if !share.is_finite() || error.abs() <= valves.band_pa {
             self.carry_s = 0.0;
             return 0.0;
         }
-        let open_rate = rate(valves, measured_pa, air, wanted > 0.0);
-        let share = (wanted / open_rate).within(-1.0, 1.0);
-        let flows_s = share * length_s;
+        if share.abs() >= 1.0 {
+            self.limited_pa = error;
+        }
+        let flows_s = share.within(-1.0, 1.0) * length_s;
         let carried = if self.carry_s * flows_s > 0.0 { self.carry_s + flows_s } else { flows_s };
         // A least pulse that would go further beyond than the pressure is away would begin an oscillation.
         let least_step_pa = open_rate * valves.least_s;
@@ -143,5 +164,7 @@ impl PairOfValves {
     }
 }
 
+#[cfg(test)]
+pub(crate) mod bench;
 #[cfg(test)]
 mod tests;

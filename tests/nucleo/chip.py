@@ -18,6 +18,7 @@ from unicorn.arm_const import (
 )
 
 import peripherals
+import valve_timer
 
 FLASH, FLASH_SIZE = 0x08000000, 0x80000
 RAM, RAM_SIZE = 0x20000000, 0x20000
@@ -63,6 +64,8 @@ class Chip:
         # Words that the flash still programs before power fails; none for all.
         self.words_left, self.words_written = None, 0
         self.outputs = []
+        # Fill and vent valve of a pair: since when, and whether each signal says open.
+        self.valves = []
         self.reset_flags = 1 << 27 | 1 << 26
         self._begin()
 
@@ -81,9 +84,10 @@ class Chip:
         self.dma1, self.dma2 = peripherals.Dma(self, {6: 17}), peripherals.Dma(self, {})
         self.tim3 = peripherals.Timer(self, 29, 16, self.adc.trigger)
         self.tim5 = peripherals.Timer(self, 50, 32)
+        self.tim4 = valve_timer.ValveTimer(self)
         self.watchdog = peripherals.Watchdog(self)
         self.blocks = {
-            0x40000400: self.tim3, 0x40000C00: self.tim5, 0x40003000: self.watchdog, 0x40004400: self.uart2,
+            0x40000400: self.tim3, 0x40000800: self.tim4, 0x40000C00: self.tim5, 0x40003000: self.watchdog, 0x40004400: self.uart2,
             0x40007000: self.power, 0x40007400: self.dac, 0x40012000: self.adc, 0x40013C00: self.exti,
             0x40020000: self.porta, 0x40020400: self.portb, 0x40020800: self.portc, 0x40023800: self.rcc, 0x40023C00: self.flash,
             0x40026000: self.dma1, 0x40026400: self.dma2,
@@ -127,9 +131,24 @@ class Chip:
         """Notes what acts on the muscle: the dump valve and the regulator's command."""
         if not hasattr(self, "dac") or not hasattr(self, "portb"):
             return
+        if hasattr(self, "tim4"):
+            signals = (self._is_high(8, valve_timer.FILL_CHANNEL), not self._is_high(9, valve_timer.VENT_CHANNEL))
+            if not self.valves or self.valves[-1][1:] != signals:
+                self.valves.append((self.now, *signals))
         now = (not self.portb.drives_high(5), self.dac.volts())
         if not self.outputs or self.outputs[-1][1:] != now:
             self.outputs.append((self.now, *now))
+
+    def _is_high(self, pin, channel):
+        """Whether a pin of port B is high that its timer may drive; one that nothing drives is low by its resistor."""
+        if self.portb.get(0x00) >> 2 * pin & 3 == 2:
+            assert self.portb.get(0x24) >> 4 * (pin - 8) & 15 == 2, "TIM4 is alternate function 2"
+            return self.tim4.is_high(channel)
+        return self.portb.drives_high(pin)
+
+    def valves_at(self, when):
+        """Signals to the fill and the vent valve at a time that has passed: whether each says open."""
+        return next((change[1:] for change in reversed(self.valves) if change[0] <= when), (False, True))
 
     @property
     def valve_open(self):

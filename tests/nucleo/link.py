@@ -50,13 +50,17 @@ def frame(kind, number, sequence, body=b""):
 
 
 # Places of settings from the end of the message; a varint before them has one byte.
+VALVES = 29
 SETTING = {
-    "command.low": -8, "command.full_pa": -4,
-    "scales.pressure.at_zero": -68, "scales.pressure.per_unit": -64, "scales.pressure.filter_s": -60,
-    "scales.second_pressure.at_zero": -32, "scales.second_pressure.per_unit": -28,
-    "watch.second_pressure_pa": -86, "watch.supply_low_pa": -82,
+    "command.low": -8 - VALVES, "command.full_pa": -4 - VALVES,
+    "scales.pressure.at_zero": -68 - VALVES, "scales.pressure.per_unit": -64 - VALVES, "scales.pressure.filter_s": -60 - VALVES,
+    "scales.second_pressure.at_zero": -32 - VALVES, "scales.second_pressure.per_unit": -28 - VALVES,
+    "watch.second_pressure_pa": -86 - VALVES, "watch.supply_low_pa": -82 - VALVES,
+    "valves.supply_pa": -28, "valves.fill_pa_per_s": -24, "valves.vent_pa_per_s": -20, "valves.dead_s": -16, "valves.least_s": -12,
+    "valves.apart_s": -8, "valves.band_pa": -4,
 }
-ENABLE_INPUT = -78
+# Those of one byte.
+BYTES = {"enable_input": -78 - VALVES, "valves__period_ticks": -VALVES}
 
 
 def varint(number):
@@ -159,8 +163,8 @@ class Link:
         """Sends the settings with others of these values; names have `__` for each dot."""
         settings = bytearray(self.ask(SETTINGS))
         for name, value in values.items():
-            if name == "enable_input":
-                settings[ENABLE_INPUT] = int(value)
+            if name in BYTES:
+                settings[BYTES[name]] = int(value)
             else:
                 at = len(settings) + SETTING[name.replace("__", ".")]
                 settings[at : at + 4] = struct.pack("<f", value)

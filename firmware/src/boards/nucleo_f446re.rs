@@ -13,7 +13,7 @@
 //! | PA4 | A2 | analogue command (DAC 1) to the regulator's 0–10 V stage, whose input takes no current; 1 MΩ to ground |
 //! | PB5 | D4 | dump valve: low opens it, so that a board without power vents; 10 kΩ to ground |
 //! | PB8 | D15 | fill valve of a pair, in place of a regulator: high opens it; 10 kΩ to ground |
-//! | PB9 | D14 | vent valve of a pair: high opens it; 10 kΩ to ground |
+//! | PB9 | D14 | vent valve of a pair: low opens it, so that a board without power vents; 10 kΩ to ground |
 //!
 //! The resistors to ground are part of the circuit: an open wire reads the lowest code, which no sensor gives, and while the chip
 //! starts its pins are open, so that they alone keep the valve open and the command at zero.

@@ -22,7 +22,7 @@ pub(super) struct Actuator {
     pub(super) watch: SideWatch,
     pub(super) regulator: RegulatorState,
     /// The valves in place of a regulator.
-    valves: PairOfValves,
+    pub(super) valves: PairOfValves,
     /// What may be demanded of the regulator and commanded, by settings, board and table.
     pub(super) bounds: Bounds,
     pub(super) trim: Integral,
@@ -108,12 +108,12 @@ impl Actuator {
 
     /// What the valves do with this tick's command, where they are fitted in place of a regulator.
     #[inline(always)]
-    pub(super) fn valves(&mut self, settings: &Settings) -> Valves {
-        if settings.valves.is_fitted() { self.pulse(settings) } else { Valves::Absent }
+    pub(super) fn pulse(&mut self, settings: &Settings) -> Valves {
+        if settings.valves.is_fitted() { self.step_valves(settings) } else { Valves::Absent }
     }
 
     #[inline(never)]
-    fn pulse(&mut self, settings: &Settings) -> Valves {
+    fn step_valves(&mut self, settings: &Settings) -> Valves {
         // Without a reading in this tick nothing is known of the pressure.
         let measured_pa = if self.readings.is_some() { self.sample.pressure_pa } else { f32::NAN };
         let air = self.air();

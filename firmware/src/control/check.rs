@@ -49,7 +49,8 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
         (Field::StrokeLoop, stroke_loop(settings)),
         (Field::Joint, joint(&settings.joint)),
         (Field::Regulator, regulator(&settings.regulator, hardware)),
-        (Field::Command, command(settings) && valves(settings, hardware)),
+        (Field::Command, command(settings)),
+        (Field::Valves, valves(settings, hardware)),
         (Field::Limits, limits(settings, hardware)),
         (Field::SensorWatch, sensors(settings, hardware)),
         (Field::Watch, watch(settings, hardware)),
@@ -65,8 +66,8 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
 pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
     let own = &hardware.settings;
     let mut repaired = false;
-    // Each iteration repairs one of ten groups; a repaired scale may spoil limits and watches.
-    for _ in 0..10 {
+    // Each iteration repairs one of eleven groups; a repaired scale may spoil limits and watches.
+    for _ in 0..11 {
         let Err(Refusal::Value(field)) = check_settings(settings, hardware) else { break };
         match field {
             Field::ForceLoop => settings.force_loop = own.force_loop,
@@ -83,7 +84,8 @@ pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
                     (own.motion_band_m, own.pressure_band_pa);
             }
             Field::Scale => settings.scales = own.scales,
-            Field::Command => (settings.command, settings.valves) = (own.command, own.valves),
+            Field::Command => settings.command = own.command,
+            Field::Valves => settings.valves = own.valves,
             Field::SetPoint | Field::Reference | Field::Rate => *settings = *own,
         }
         repaired = true;
@@ -187,27 +189,37 @@ fn command(settings: &Settings) -> bool {
 
 /// Periods of a pair of valves, ticks: shorter, valves that switch in 1 ms are hardly ever open; longer, no muscle is controlled.
 const PERIODS: core::ops::RangeInclusive<u16> = 4..=50;
-/// The pressure is corrected once in a period, so that its lag is that of two periods at least.
+/// The pressure is corrected once in a period and acts up to a period later. With a lag of two periods or more, every correction is at most
+/// half of the error, so that the loop does not swing; a filter of a quarter of the lag is a further eighth of that.
 const LAG_PERIODS: f32 = 2.0;
-/// Longest dead time and shortest pulse, s: valves that need longer are none for pulses.
+const FILTER_LAGS: f32 = 0.25;
+/// Longest dead time, shortest pulse and time apart, s: valves that need longer are none for pulses.
 const MOST_SWITCHING: f32 = 10e-3;
+/// Largest band of pressure, Pa.
+const MOST_BAND: f32 = 100e3;
 
-/// Valves need outputs of the board, and a pressure sensor over which the loop is closed.
+/// Valves need outputs of the board, and a pressure sensor over which the loop is closed. A command above the supply is never reached, and
+/// a period has room for the shortest pulse in the other direction.
 fn valves(settings: &Settings, hardware: &Hardware) -> bool {
     let v = &settings.valves;
-    let lag_s = LAG_PERIODS * TICK_S * f32::from(v.period_ticks);
+    let regulator = &settings.regulator;
+    let length_s = TICK_S * f32::from(v.period_ticks);
     all(&[
         (v.supply_pa, 10e3, MOST_PRESSURE),
         (v.fill_pa_per_s, 1e3, MOST_RATE),
         (v.vent_pa_per_s, 1e3, MOST_RATE),
         (v.dead_s, 0.0, MOST_SWITCHING),
         (v.least_s, 0.0, MOST_SWITCHING),
-        (v.band_pa, 0.0, 100e3),
+        (v.apart_s, 0.0, MOST_SWITCHING),
+        (v.band_pa, 0.0, MOST_BAND),
     ]) && (!v.is_fitted()
         || (hardware.valve_pair
             && settings.pressure.fitted
             && PERIODS.contains(&v.period_ticks)
-            && settings.regulator.lag_s >= lag_s))
+            && regulator.lag_s >= LAG_PERIODS * length_s
+            && settings.scales.pressure.filter_s <= FILTER_LAGS * regulator.lag_s
+            && regulator.command_max_pa <= v.supply_pa
+            && v.dead_s + v.least_s + v.apart_s <= length_s))
 }
 
 /// A limit beyond what its converter can deliver would never be crossed.
@@ -295,7 +307,7 @@ mod tests {
     fn the_defaults_can_be_used_and_no_field_takes_what_is_no_number_or_has_no_bound() {
         assert_eq!(refused(|_| ()), None);
         type Set = fn(&mut Settings, f32);
-        let fields: [(Field, Set); 53] = [
+        let fields: [(Field, Set); 54] = [
             (Field::ForceLoop, |s, v| s.force_loop.proportional_pa_per_n = v),
             (Field::ForceLoop, |s, v| s.force_loop.integral_pa_per_n_s = v),
             (Field::ForceLoop, |s, v| s.force_loop.trim_limit_pa = v),
@@ -343,12 +355,13 @@ mod tests {
             (Field::Command, |s, v| s.command.full_pa = v),
             (Field::Watch, |s, v| s.watch.second_pressure_pa = v),
             (Field::Watch, |s, v| s.watch.supply_low_pa = v),
-            (Field::Command, |s, v| s.valves.supply_pa = v),
-            (Field::Command, |s, v| s.valves.fill_pa_per_s = v),
-            (Field::Command, |s, v| s.valves.vent_pa_per_s = v),
-            (Field::Command, |s, v| s.valves.dead_s = v),
-            (Field::Command, |s, v| s.valves.least_s = v),
-            (Field::Command, |s, v| s.valves.band_pa = v),
+            (Field::Valves, |s, v| s.valves.supply_pa = v),
+            (Field::Valves, |s, v| s.valves.fill_pa_per_s = v),
+            (Field::Valves, |s, v| s.valves.vent_pa_per_s = v),
+            (Field::Valves, |s, v| s.valves.dead_s = v),
+            (Field::Valves, |s, v| s.valves.least_s = v),
+            (Field::Valves, |s, v| s.valves.apart_s = v),
+            (Field::Valves, |s, v| s.valves.band_pa = v),
         ];
         for (at, (field, set)) in fields.into_iter().enumerate() {
             for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3.4e38, 1e30, -1e30] {

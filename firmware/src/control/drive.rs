@@ -82,7 +82,8 @@ impl Controller {
         } else if driven.saturated {
             demand.pressure_pa - driven.pressure_demand_pa
         } else {
-            0.0
+            // Zero where none are fitted, and where the valves do what is commanded.
+            actuator.valves.limited_pa()
         };
         if !reached || driven.saturated {
             self.saturated_ticks = self.saturated_ticks.saturating_add(1);

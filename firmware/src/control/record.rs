@@ -4,7 +4,7 @@ use model_core::link::messages::{Event, Mode, Side, State, Variable};
 
 use super::actuator::Actuator;
 use super::{Controller, Notice};
-use crate::board::Outputs;
+use crate::board::{Command, Outputs};
 use crate::outbox::{SIDES, Sample};
 use crate::pair;
 use crate::valves::Valves;
@@ -17,10 +17,15 @@ impl Controller {
         let settings = &self.settings;
         let [first, second] = &mut self.sides;
         // A board for one muscle has no second output.
-        let second = if pair::SUPPORTED { second.valves(settings) } else { Valves::Absent };
-        let valves = [first.valves(settings), second];
+        let second = if pair::SUPPORTED { second.pulse(settings) } else { Valves::Absent };
+        let valves = [first.pulse(settings), second];
         let Self { trace, sides, machine, tick, setpoint, step_us, .. } = self;
         let state = machine.state();
+        // An output whose place the valves have taken fills nothing.
+        let level = |command: &Command| match self.settings.valves.is_fitted() {
+            true => 0.0,
+            false => self.settings.command.part(command.pressure_pa),
+        };
         let full = trace.sample(*tick, |variable| value_of(variable, sides, state, *setpoint, *step_us));
         if full {
             self.notice = self.notice.or(Some(Notice::TraceFull));
@@ -28,13 +33,9 @@ impl Controller {
         Outputs {
             sides: [self.sides[0].command, self.sides[1].command],
             levels: [
-                self.settings.command.part(self.sides[0].command.pressure_pa),
+                level(&self.sides[0].command),
                 // A board for one muscle has no second output.
-                if pair::SUPPORTED {
-                    self.settings.command.part(self.sides[1].command.pressure_pa)
-                } else {
-                    0.0
-                },
+                if pair::SUPPORTED { level(&self.sides[1].command) } else { 0.0 },
             ],
             valves,
             state,

@@ -18,6 +18,7 @@ mod refusals;
 mod silences;
 mod tracking;
 mod valve_test;
+mod valves;
 
 /// The session that arms and starts in these tests.
 const OWNER: Session = Session { id: 7 };

@@ -21,4 +21,5 @@ pub mod rubbing;
 pub mod sensors;
 pub mod surface;
 pub mod tube;
+pub mod valves;
 pub mod wall_creep;

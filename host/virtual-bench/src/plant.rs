@@ -17,6 +17,7 @@ use crate::muscle::Muscle;
 use crate::pneumatics::{Air, Pneumatics};
 use crate::rig::RigState;
 use crate::sensors::Channel;
+use crate::valves::{Open, ValvePair, Valves};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -143,6 +144,8 @@ pub struct Readings {
 
 /// Longest step of the physics, s.
 const LONGEST: f64 = 0.25e-3;
+/// The same with valves, by which the length of a pulse is resolved.
+const SHORTEST_PULSE: f64 = 0.05e-3;
 
 /// A muscle with air, load and sensors under a controller.
 #[derive(Debug, Clone)]
@@ -159,6 +162,16 @@ pub struct Plant {
     temperature: f64,
     readings: Readings,
     done: bool,
+    valves: Option<Valves>,
+}
+
+/// What gives the muscle its air.
+#[derive(Debug, Clone, Copy)]
+enum Supply {
+    /// The regulator, under a command, Pa.
+    Regulator(f64),
+    /// The pair of valves, under signals.
+    Valves(Open),
 }
 
 impl Plant {
@@ -189,8 +202,9 @@ impl Plant {
             temperature: 22.0,
             readings: Readings::default(),
             done,
+            valves: None,
         };
-        plant.advance(LONGEST, 0.0);
+        plant.advance(LONGEST, Supply::Regulator(0.0));
         plant.time = 0.0;
         plant.sample(1e-3);
         plant
@@ -201,13 +215,34 @@ impl Plant {
         let parts = (dt / LONGEST).ceil().clamp(1.0, 1e6) as u32;
         let h = dt / f64::from(parts);
         for _ in 0..parts {
-            self.advance(h, command);
+            self.advance(h, Supply::Regulator(command));
         }
         self.sample(dt);
         self.readings
     }
 
-    fn advance(&mut self, h: f64, command: f64) {
+    /// Replaces the regulator by a pair of on/off valves.
+    pub fn fit_valves(&mut self, pair: ValvePair) {
+        self.valves = Some(Valves::new(pair));
+    }
+
+    /// The pair of valves, if one is fitted.
+    pub fn valves(&mut self) -> Option<&mut Valves> {
+        self.valves.as_mut()
+    }
+
+    /// Advance by one control period `dt` (s) under the valves' signals at each time (s) in it; gives the readings at its end.
+    pub fn step_valves(&mut self, dt: f64, signals: &dyn Fn(f64) -> Open) -> Readings {
+        let parts = (dt / SHORTEST_PULSE).ceil().clamp(1.0, 1e6) as u32;
+        let h = dt / f64::from(parts);
+        for part in 0..parts {
+            self.advance(h, Supply::Valves(signals((f64::from(part) + 0.5) * h)));
+        }
+        self.sample(dt);
+        self.readings
+    }
+
+    fn advance(&mut self, h: f64, supply: Supply) {
         self.time += h;
         if let Motion::Load { mass, spring, preload, damper } = self.motion {
             let limit = 0.45 * self.muscle.spec().geometry.rest_length;
@@ -223,7 +258,12 @@ impl Plant {
             (self.stroke, self.done) = self.motion.stroke(self.time);
         }
         let stroke = self.rig.stroke(self.stroke, self.force);
-        let pressure = self.air.advance(h, command.max(0.0), self.muscle.volume(stroke));
+        let volume = self.muscle.volume(stroke);
+        let pressure = match (supply, &mut self.valves) {
+            (Supply::Valves(signals), Some(valves)) => self.air.advance_valves(h, valves, signals, volume),
+            (Supply::Valves(_), None) => self.air.advance(h, 0.0, volume),
+            (Supply::Regulator(command), _) => self.air.advance(h, command.max(0.0), volume),
+        };
         let drive = self.muscle.advance(h, stroke, pressure, 22.0);
         self.force = drive.force;
         self.temperature = drive.temperature;

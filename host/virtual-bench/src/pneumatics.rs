@@ -6,6 +6,7 @@
 //! pressure, however good the regulator.
 
 use crate::rng::Rng;
+use crate::valves::{Open, Valves};
 use serde::{Deserialize, Serialize};
 
 /// Atmospheric pressure, Pa.
@@ -102,6 +103,18 @@ impl Air {
         let squeeze = change / volume.max(0.1 * self.rest_volume);
         let pumped = self.muscle - ATMOSPHERE * squeeze + flow * self.regulator;
         self.muscle = (pumped / (1.0 + flow * (1.0 + w.leak) + squeeze)).max(0.0);
+        self.muscle
+    }
+
+    /// Advance by `dt` (s) to an inner volume (m³) with a pair of valves in place of regulator and line; gives the pressure in the muscle, Pa.
+    pub fn advance_valves(&mut self, dt: f64, valves: &mut Valves, signals: Open, volume: f64) -> f64 {
+        let before = self.volume.unwrap_or(volume);
+        self.volume = Some(volume);
+        let gained = dt * valves.rate(dt, signals, self.muscle) * self.rest_volume;
+        // Isothermal: the amount of air is (P + P_atm)·V.
+        let amount = (self.muscle + ATMOSPHERE) * before + gained;
+        self.muscle = (amount / volume.max(0.1 * self.rest_volume) - ATMOSPHERE).max(0.0);
+        self.regulator = self.muscle;
         self.muscle
     }
 

@@ -16,12 +16,15 @@ use pam_device::regulator::{self, Found};
 use virtual_bench::bench::BenchSpec;
 use virtual_bench::plant::{Motion, Plant};
 
+use crate::pulses::{Pulses, real_valves};
+
 /// A controller on a plant.
 pub struct Loop {
     /// The controller.
     pub controller: Controller,
     plant: Plant,
     outputs: Outputs,
+    pulses: Pulses,
 }
 
 /// What one tick was like.
@@ -55,7 +58,11 @@ impl Loop {
         settings.watch.autonomous = true;
         let mut controller = Controller::new(&settings);
         controller.use_table(Side::Agonist, table).expect("a valid table");
-        let mut this = Self { controller, plant: Plant::new(bench, motion), outputs: Outputs::VENT };
+        let mut plant = Plant::new(bench, motion);
+        if settings.valves.is_fitted() {
+            plant.fit_valves(real_valves(&settings.valves));
+        }
+        let mut this = Self { controller, plant, outputs: Outputs::VENT, pulses: Pulses::default() };
         this.tick();
         this.controller.arm(Session::default()).expect("it arms");
         this.controller.start(mode, Session::default()).expect("it starts");
@@ -64,9 +71,14 @@ impl Loop {
 
     /// One millisecond; gives the sample, if one was due.
     pub fn tick(&mut self) -> Option<Sample> {
-        let command = self.outputs.sides[0];
-        let pressure = if command.vent { 0.0 } else { f64::from(command.pressure_pa) };
-        let r = self.plant.step(f64::from(TICK_S), pressure);
+        let r = if self.plant.valves().is_some() {
+            let signals = self.pulses.tick(self.outputs.valves[0], self.outputs.sides[0].vent);
+            self.plant.step_valves(f64::from(TICK_S), &signals)
+        } else {
+            let command = self.outputs.sides[0];
+            let pressure = if command.vent { 0.0 } else { f64::from(command.pressure_pa) };
+            self.plant.step(f64::from(TICK_S), pressure)
+        };
         let readings =
             Readings { pressure_pa: r.pressure as f32, stroke_m: r.stroke as f32, force_n: r.force as f32 };
         let inputs = Inputs { sides: [Some(readings.into()), None], ..Inputs::default() };
@@ -95,6 +107,16 @@ impl Loop {
                 }
             })
             .collect()
+    }
+
+    /// What the controller orders.
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// The muscle, its air and its load, to break them while they run.
+    pub fn plant(&mut self) -> &mut Plant {
+        &mut self.plant
     }
 
     /// What is true on the bench now.

@@ -20,6 +20,7 @@ pub mod machine;
 pub mod pair;
 pub mod patience;
 pub mod program;
+pub mod pulses;
 pub mod shared_line;
 pub mod stations;
 pub mod sweep;

@@ -1,7 +1,8 @@
 //! What acts on the muscle: the regulator's analogue command or a pair of valves, and the dump valve.
 //!
 //! The valves are outputs of TIM4, which counts microseconds and stops at the end of a period (one-pulse mode). A pulse lies at the end of
-//! its period, so that a stopped counter, which is zero, closes the valve: if the program stops, both valves close within the period.
+//! its period, so that a stopped counter, which is zero, closes the valve: if the program stops, nothing fills behind the period. The fill
+//! valve opens at a high level, the vent valve at a low one, as a chip without power or in a reset gives it: fill closed, vent open.
 
 use firmware::valves::Valves;
 
@@ -37,6 +38,8 @@ const VENT: u32 = 9;
 /// Counts once, and whether it counts.
 const ONE_PULSE: u32 = 1 << 3;
 const COUNTS: u32 = 1;
+/// Outputs on; that of channel 4 is active when it is low (CC4P).
+const OUTPUTS: u32 = 1 << 13 | 1 << 12 | 1 << 8;
 /// Modes of the outputs, channel 4 above channel 3: both inactive, only the vent valve active, both active from their compare on (PWM mode 2).
 const BOTH_CLOSED: u32 = 0b100 << 12 | 0b100 << 4;
 const VENT_OPEN: u32 = 0b101 << 12 | 0b100 << 4;
@@ -48,7 +51,8 @@ const LIGHT: u32 = 5;
 /// Makes both outputs safe: before any clock is set up, with nothing but the processor's own oscillator running.
 pub fn start() {
     AHB1ENR.set(0b11);
-    APB1ENR.set(1 << 29);
+    // The converter and the valves' timer.
+    APB1ENR.set(1 << 29 | 1 << 2);
     dump();
     // PB5 is an output, PA4 analogue.
     GPIOB_MODER.write(GPIOB_MODER.read() & !(0b11 << (2 * VALVE)) | 0b01 << (2 * VALVE));
@@ -60,11 +64,10 @@ pub fn start() {
     DAC_CR.write(1 << 1 | 1 << 0);
 }
 
-/// Both valves closed; their timer stands.
+/// The fill valve closed, the vent valve open; their timer stands.
 fn start_valves() {
-    APB1ENR.set(1 << 2);
-    TIM_CCMR2.write(BOTH_CLOSED);
-    TIM_CCER.write(1 << 12 | 1 << 8);
+    TIM_CCMR2.write(VENT_OPEN);
+    TIM_CCER.write(OUTPUTS);
     let second = |pin: u32| 2 << (4 * (pin - 8));
     let both = 0b1111 << (4 * (FILL - 8)) | 0b1111 << (4 * (VENT - 8));
     GPIOB_AFRH.write(GPIOB_AFRH.read() & !both | second(FILL) | second(VENT));
@@ -76,9 +79,9 @@ fn start_valves() {
 /// What the valves do in a tick.
 pub fn valves(valves: Valves) {
     match valves {
-        Valves::Absent | Valves::Continue => {}
+        Valves::Continue => {}
         Valves::Closed => TIM_CCMR2.write(BOTH_CLOSED),
-        Valves::Vent => TIM_CCMR2.write(VENT_OPEN),
+        Valves::Absent | Valves::Vent => TIM_CCMR2.write(VENT_OPEN),
         Valves::Period { fill_us, vent_us, length_us } => {
             let length = u32::from(length_us);
             TIM_CR1.write(ONE_PULSE);
@@ -100,11 +103,12 @@ pub fn light(on: bool) {
     GPIOA_BSRR.write(if on { 1 << LIGHT } else { 1 << (16 + LIGHT) });
 }
 
-/// Opens the dump valve and asks the regulator for no pressure, which would continue filling against it, whatever state the program is in.
+/// Opens the dump valve and the vent valve, closes the fill valve and asks the regulator for no pressure, which would continue filling
+/// against them, whatever state the program is in.
 pub fn dump() {
     GPIOB_BSRR.write(1 << (16 + VALVE));
     DAC_DHR12R1.write(0);
-    TIM_CCMR2.write(BOTH_CLOSED);
+    TIM_CCMR2.write(VENT_OPEN);
 }
 
 /// Commands a part of the output's range, and the valve open or closed.

@@ -68,12 +68,13 @@ fn loops_joint_and_regulator_have_these_ranges() {
         (Field::Regulator, 1e3, 2e6, |s, v| (s.regulator.command_max_pa, s.command.full_pa) = (v, 5e6)),
         (Field::Command, 10e3, 5e6, |s, v| (s.regulator.command_max_pa, s.command.full_pa) = (1e3, v)),
         (Field::Command, 650e3, 5e6, |s, v| s.command.full_pa = v),
-        (Field::Command, 10e3, 5e6, |s, v| s.valves.supply_pa = v),
-        (Field::Command, 1e3, 1e9, |s, v| s.valves.fill_pa_per_s = v),
-        (Field::Command, 1e3, 1e9, |s, v| s.valves.vent_pa_per_s = v),
-        (Field::Command, 0.0, 10e-3, |s, v| s.valves.dead_s = v),
-        (Field::Command, 0.0, 10e-3, |s, v| s.valves.least_s = v),
-        (Field::Command, 0.0, 100e3, |s, v| s.valves.band_pa = v),
+        (Field::Valves, 10e3, 5e6, |s, v| s.valves.supply_pa = v),
+        (Field::Valves, 1e3, 1e9, |s, v| s.valves.fill_pa_per_s = v),
+        (Field::Valves, 1e3, 1e9, |s, v| s.valves.vent_pa_per_s = v),
+        (Field::Valves, 0.0, 10e-3, |s, v| s.valves.dead_s = v),
+        (Field::Valves, 0.0, 10e-3, |s, v| s.valves.least_s = v),
+        (Field::Valves, 0.0, 10e-3, |s, v| s.valves.apart_s = v),
+        (Field::Valves, 0.0, 100e3, |s, v| s.valves.band_pa = v),
     ]);
 }
 
@@ -169,25 +170,51 @@ fn what_a_board_does_not_have_is_not_watched() {
 fn a_pair_of_valves_needs_outputs_a_pressure_sensor_and_a_lag_of_two_periods() {
     let with = Hardware { valve_pair: true, ..BOARD };
     let pair = |ticks: u16, lag_s: f32| {
-        move |settings: &mut Settings| (settings.valves.period_ticks, settings.regulator.lag_s) = (ticks, lag_s)
+        move |settings: &mut Settings| {
+            (settings.valves.period_ticks, settings.regulator.lag_s) = (ticks, lag_s);
+            settings.valves.apart_s = 2e-3;
+        }
     };
     for ticks in [4, 5, 50] {
         let lag_s = 2e-3 * f32::from(ticks);
         assert_eq!(found(&with, pair(ticks, lag_s)), None);
-        assert_eq!(found(&with, pair(ticks, lag_s.next_down())), Some(Field::Command), "{ticks}");
-        assert_eq!(found(&BOARD, pair(ticks, lag_s)), Some(Field::Command), "without outputs");
+        assert_eq!(found(&with, pair(ticks, lag_s.next_down())), Some(Field::Valves), "{ticks}");
+        assert_eq!(found(&BOARD, pair(ticks, lag_s)), Some(Field::Valves), "without outputs");
         let blind = |s: &mut Settings| {
             pair(ticks, lag_s)(s);
             s.pressure.fitted = false;
         };
-        assert_eq!(found(&with, blind), Some(Field::Command), "without a sensor");
+        assert_eq!(found(&with, blind), Some(Field::Valves), "without a sensor");
     }
     for ticks in [1, 3, 51, u16::MAX] {
-        assert_eq!(found(&with, pair(ticks, 10.0)), Some(Field::Command), "{ticks}");
+        assert_eq!(found(&with, pair(ticks, 10.0)), Some(Field::Valves), "{ticks}");
     }
     let mut settings = Settings::DEFAULT;
     pair(10, 0.1)(&mut settings);
     assert!(repair_settings(&mut settings, &BOARD) && !settings.valves.is_fitted());
+}
+
+#[test]
+fn a_pair_of_valves_has_room_in_its_period_supply_for_its_command_and_a_quick_filter() {
+    let with = Hardware { valve_pair: true, ..BOARD };
+    let fitted = |change: fn(&mut Settings, f32), value: f32| {
+        found(&with, move |s| {
+            (s.valves.period_ticks, s.regulator.lag_s) = (8, 0.04);
+            (s.valves.dead_s, s.valves.least_s, s.valves.apart_s) = (1e-3, 1e-3, 2e-3);
+            change(s, value);
+        })
+    };
+    let edges: [(fn(&mut Settings, f32), f32, f32); 5] = [
+        (|s, v| s.valves.dead_s = v, 4.9e-3, 5.1e-3),
+        (|s, v| s.valves.least_s = v, 4.9e-3, 5.1e-3),
+        (|s, v| s.valves.apart_s = v, 5.9e-3, 6.1e-3),
+        (|s, v| s.scales.pressure.filter_s = v, 9.9e-3, 10.1e-3),
+        (|s, v| s.valves.supply_pa = v, Settings::DEFAULT.regulator.command_max_pa, 649e3),
+    ];
+    for (at, (change, good, bad)) in edges.into_iter().enumerate() {
+        assert_eq!(fitted(change, good), None, "{at}");
+        assert_eq!(fitted(change, bad), Some(Field::Valves), "{at}");
+    }
 }
 
 #[test]

@@ -182,6 +182,7 @@ const fn field_name(field: Field) -> &'static str {
         Field::Bands => "a band of motion in the settings",
         Field::Scale => "the scale or the filter of a sensor",
         Field::Command => "the output to the pressure regulator",
+        Field::Valves => "the setting `valves`",
         Field::Rate => "the rate of telemetry or of a trace",
     }
 }

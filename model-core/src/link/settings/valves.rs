@@ -21,21 +21,25 @@ pub struct ValvePair {
     pub vent_pa_per_s: f32,
     /// By how much a valve opens later after its signal than it closes after the signal's end, s.
     pub dead_s: f32,
-    /// Shortest time for which a valve opens reliably, s.
+    /// Shortest time for which a valve can be open, s: no less than it takes to close, because a signal that ends before the valve has
+    /// moved does nothing.
     pub least_s: f32,
+    /// Time from the end of one valve's signal to the start of the other's, s: at least what a valve takes to close, so that they are never both open.
+    pub apart_s: f32,
     /// Largest error of pressure at which both valves stay closed, Pa.
     pub band_pa: f32,
 }
 
 impl ValvePair {
-    /// None fitted. The numbers are those of common valves that switch in 2 ms.
+    /// None fitted. The numbers are those of common valves that switch within a millisecond.
     pub const NONE: Self = Self {
         period_ticks: 0,
         supply_pa: 700e3,
-        fill_pa_per_s: 5e6,
-        vent_pa_per_s: 5e6,
-        dead_s: 0.5e-3,
-        least_s: 0.5e-3,
+        fill_pa_per_s: 4e6,
+        vent_pa_per_s: 4e6,
+        dead_s: 0.3e-3,
+        least_s: 1e-3,
+        apart_s: 2e-3,
         band_pa: 1e3,
     };
 
@@ -46,4 +50,13 @@ impl ValvePair {
     }
 }
 
-fields!(ValvePair { period_ticks, supply_pa, fill_pa_per_s, vent_pa_per_s, dead_s, least_s, band_pa });
+fields!(ValvePair {
+    period_ticks,
+    supply_pa,
+    fill_pa_per_s,
+    vent_pa_per_s,
+    dead_s,
+    least_s,
+    apart_s,
+    band_pa
+});

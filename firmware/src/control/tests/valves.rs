@@ -1,0 +1,185 @@
+//! The control loop with a pair of on/off valves, on a muscle of real air: pressure and force follow, and every fault vents.
+
+use super::*;
+use crate::board::Hardware;
+use crate::valves::Valves;
+use crate::valves::bench::Muscle;
+
+/// The loop and the muscle between its valves. There is no dump valve.
+struct Loop {
+    controller: Controller,
+    muscle: Muscle,
+    tick: u32,
+}
+
+impl Loop {
+    fn new(change: impl FnOnce(&mut Settings)) -> Self {
+        let mut settings = Settings::default();
+        settings.valves.period_ticks = 10;
+        change(&mut settings);
+        let hardware = Hardware { valve_pair: true, ..Hardware::SIMULATED };
+        assert_eq!(crate::control::check_settings(&settings, &hardware), Ok(()));
+        // Valves that give a tenth less than their settings say.
+        let mut real = settings.valves;
+        (real.fill_pa_per_s, real.vent_pa_per_s) = (0.9 * real.fill_pa_per_s, 0.9 * real.vent_pa_per_s);
+        Self { controller: Controller::new(&settings), muscle: Muscle::new(&real), tick: 0 }
+    }
+
+    fn running(change: impl FnOnce(&mut Settings)) -> Self {
+        let mut it = Self::new(change);
+        it.pass(10);
+        assert_eq!(it.controller.arm(OWNER), Ok(()));
+        assert_eq!(it.controller.start(Mode::Pressure, OWNER), Ok(()));
+        it
+    }
+
+    fn pass_with(&mut self, change: impl Fn(&mut Readings)) -> Outputs {
+        self.tick += 1;
+        let wiggle = (self.tick % 7) as f32 - 3.0;
+        let mut now = Readings {
+            pressure_pa: self.muscle.pressure_pa() as f32 + 50.0 * wiggle,
+            stroke_m: 1e-3 + 1e-7 * wiggle,
+            force_n: 1e-3 * wiggle,
+        };
+        change(&mut now);
+        let mut inputs = Inputs::default();
+        inputs.sides[0] = Some(now.into());
+        let outputs = self.controller.step(&inputs);
+        assert_eq!(self.controller.keep_alive(OWNER), Ok(()));
+        assert_eq!(outputs.levels, [0.0; 2], "the output of a regulator");
+        self.muscle.pass(outputs.valves[0]);
+        outputs
+    }
+
+    fn pass(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.pass_with(|_| ());
+        }
+    }
+
+    fn to(&mut self, pascals: f32) {
+        assert_eq!(self.controller.set_point(to_pressure(pascals)), Ok(()));
+    }
+
+    fn latched(&self) -> Option<Fault> {
+        self.controller.faults().latched.map(|report| report.fault)
+    }
+}
+
+#[test]
+fn pressure_follows_a_step_within_a_hundred_milliseconds_and_two_percent() {
+    for ticks in [5, 10, 15] {
+        let mut it = Loop::running(|s| {
+            s.valves.period_ticks = ticks;
+            (s.valves.apart_s, s.valves.dead_s) = (2e-3, 0.5e-3);
+        });
+        let mut from = 0.0;
+        for to in [200e3, 400e3, 300e3, 100e3] {
+            it.to(to);
+            it.pass(100);
+            let (mut most, mut least) = (f64::MIN, f64::MAX);
+            for _ in 0..300 {
+                it.pass(1);
+                let gone = (it.muscle.pressure_pa() - from) / (f64::from(to) - from);
+                (most, least) = (most.max(gone), least.min(gone));
+            }
+            assert!(most < 1.02 && least > 0.98, "{least} to {most} at {to} Pa, {ticks} ticks");
+            from = f64::from(to);
+        }
+        assert_eq!((it.controller.state(), it.latched()), (State::Running, None));
+        assert_eq!(it.muscle.both_open, 0);
+    }
+}
+
+#[test]
+fn pressure_follows_a_ramp_within_five_kilopascals() {
+    let mut it = Loop::running(|_| ());
+    let mut worst = 0.0_f64;
+    for tick in 0..2_000_u32 {
+        // 100 to 500 kPa and back within a second each.
+        let wanted = 100e3 + 400.0 * if tick < 1_000 { tick } else { 2_000 - tick } as f32;
+        it.to(wanted);
+        it.pass(1);
+        // At the turn the lead of the regulator's model needs some lags.
+        if tick % 1_000 > 200 {
+            worst = worst.max((it.muscle.pressure_pa() - f64::from(wanted)).abs());
+        }
+    }
+    assert!(worst < 5e3, "{worst} Pa");
+    assert_eq!(it.latched(), None);
+}
+
+#[test]
+fn a_fault_closes_the_fill_valve_opens_the_vent_valve_and_empties_the_muscle() {
+    type Change = fn(&mut Readings);
+    let faults: [(Fault, Change); 4] = [
+        (Fault::OverPressure, |now| now.pressure_pa = 900e3),
+        (Fault::SensorRange, |now| now.pressure_pa = f32::NAN),
+        (Fault::SensorRange, |now| now.force_n = f32::INFINITY),
+        (Fault::OverForce, |now| now.force_n = 3_900.0),
+    ];
+    for (fault, change) in faults {
+        let mut it = Loop::running(|_| ());
+        it.to(400e3);
+        // The fill valve is open.
+        it.pass(15);
+        let ticks = (1..=5).find(|_| it.pass_with(change).valves[0] == Valves::Vent);
+        assert!(ticks.is_some_and(|ticks| ticks <= 3), "{fault:?}: {ticks:?}");
+        assert_eq!(it.latched(), Some(fault));
+        for _ in 0..1_000 {
+            assert_eq!(it.pass_with(|_| ()).valves[0], Valves::Vent);
+        }
+        assert!(it.muscle.pressure_pa() < 1e3, "{}", it.muscle.pressure_pa());
+    }
+}
+
+#[test]
+fn a_hold_keeps_the_pressure_without_a_reading_and_ends_vented() {
+    let mut it = Loop::running(|s| {
+        s.watch.hold_ticks = 500;
+        s.hold_on = 1 << Fault::SensorRange.code();
+    });
+    it.to(300e3);
+    it.pass(500);
+    let broken = |now: &mut Readings| now.pressure_pa = f32::NAN;
+    let mut closed = true;
+    for tick in 0..400 {
+        let done = it.pass_with(broken).valves[0];
+        let is_closed = matches!(done, Valves::Continue | Valves::Period { fill_us: 0, vent_us: 0, .. });
+        closed &= tick < 10 || is_closed;
+    }
+    assert_eq!(it.latched(), Some(Fault::SensorRange));
+    assert!(closed && it.muscle.pressure_pa() > 280e3, "{}", it.muscle.pressure_pa());
+    for _ in 0..600 {
+        it.pass_with(broken);
+    }
+    assert!(it.muscle.pressure_pa() < 5e3, "{}", it.muscle.pressure_pa());
+}
+
+#[test]
+fn a_jammed_fill_valve_is_a_fault() {
+    let mut it = Loop::running(|_| ());
+    it.to(150e3);
+    it.pass(500);
+    it.muscle.fill_jammed = true;
+    let ticks = (1..1_000).find(|_| {
+        it.pass(1);
+        it.latched().is_some()
+    });
+    // 150 kPa beyond the model, which takes some tens of milliseconds, and that for 200.
+    assert!(ticks.is_some_and(|ticks| (200..300).contains(&ticks)), "{ticks:?}");
+    assert_eq!(it.latched(), Some(Fault::PressureNotFalling));
+    assert_eq!(it.pass_with(|_| ()).valves[0], Valves::Vent);
+}
+
+/// An outer loop that goes on while the valves are as far open as they can be would go beyond afterwards.
+#[test]
+fn while_the_valves_cannot_follow_no_integrator_goes_on() {
+    let mut it = Loop::running(|s| (s.valves.fill_pa_per_s, s.valves.vent_pa_per_s) = (200e3, 200e3));
+    it.to(400e3);
+    it.pass(100);
+    assert!(it.controller.sides[0].saturation > 100e3, "{}", it.controller.sides[0].saturation);
+    it.to(100e3);
+    it.pass(5_000);
+    assert_eq!(it.controller.sides[0].saturation, 0.0);
+}
