@@ -33,12 +33,17 @@ class Board:
         self.chip.run(settle)
         self.link = Link(self.chip)
 
-    def step(self):
-        """A millisecond of the muscle; survives restarts of the chip."""
+    def pressure_later(self):
+        """Pressure at the end of a millisecond."""
         chip = self.chip
         volts = 0.0 if chip.valve_open else chip.command_volts
         wanted_pa = 0.0 if chip.valve_open else self.regulator(volts)
-        self.pressure_pa += (wanted_pa - self.pressure_pa) * TICK_S / LAG_S
+        return self.pressure_pa + (wanted_pa - self.pressure_pa) * TICK_S / LAG_S
+
+    def step(self):
+        """A millisecond of the muscle; survives restarts of the chip."""
+        chip = self.chip
+        self.pressure_pa = self.pressure_later()
         noise = self.random.uniform
         force_n = max(0.0, (self.pressure_pa - 76.5e3) * 1.5e-4)
         volt = {

@@ -70,8 +70,9 @@ impl Controller {
         let actuator = &mut self.sides[side.index()];
         let ceiling_pa = self.hardware.command_ceiling_pa;
         let high = actuator.bounds.high_pa;
-        // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it.
-        if settings.pressure.fitted && settings.regulator.lead > 0.0 {
+        // Without lead a command is the setpoint, as anyone who measures the regulator itself wants it. Valves are controlled on the
+        // pressure itself: nothing drifts, and while they are as far open as they can be, the model runs ahead of them.
+        if settings.pressure.fitted && settings.regulator.lead > 0.0 && !settings.valves.is_fitted() {
             actuator.regulator.observe(actuator.sample.pressure_pa, &self.law);
         }
         let air = actuator.air();

@@ -119,7 +119,7 @@ mod tests {
     fn a_valve_opens_and_closes_late_and_a_short_signal_does_nothing() {
         let mut valves = Valves::new(ValvePair::default());
         let mut open_for = |signal: f64| {
-            let mut time = 0.0;
+            let mut time = 0.0_f64;
             for step in 0..200 {
                 let fill = f64::from(step) * 1e-4 < signal;
                 let rate = valves.rate(1e-4, Open { fill, ..Open::default() }, 0.0);
