@@ -11,7 +11,7 @@ const ATMOSPHERE: f64 = 101_325.0;
 pub(crate) const REST: f64 = 20e-6;
 /// Step of the physics, s.
 const STEP_S: f64 = 20e-6;
-/// Time that a valve takes to close, s; it opens by the dead time later.
+/// Time that a valve usually takes to close, s; it opens by the dead time later.
 const CLOSES_S: f64 = 1e-3;
 
 /// A valve that is open from some time after its signal on until some time after the signal's end.
@@ -26,14 +26,13 @@ struct Valve {
 
 impl Valve {
     /// One step of the physics under its signal, from a pressure to another: mol.
-    fn through(&mut self, on: bool, dead_s: f64, before: f64, behind: f64) -> f64 {
+    fn through(&mut self, on: bool, [opens_s, closes_s]: [f64; 2], before: f64, behind: f64) -> f64 {
         if on {
             (self.on_s, self.off_s) = (self.on_s + STEP_S, 0.0);
         } else {
             (self.on_s, self.off_s) = (0.0, self.off_s + STEP_S);
         }
-        self.open =
-            if on { self.open || self.on_s > CLOSES_S + dead_s } else { self.open && self.off_s <= CLOSES_S };
+        self.open = if on { self.open || self.on_s > opens_s } else { self.open && self.off_s <= closes_s };
         if !self.open || behind >= before {
             return 0.0;
         }
@@ -54,6 +53,8 @@ pub(crate) struct Muscle {
     pub(crate) widening: f64,
     /// Leak, mol/(s·Pa).
     pub(crate) leak: f64,
+    /// Time that a valve takes to close, s.
+    pub(crate) closes_s: f64,
     /// Whether the fill valve stays open without a signal.
     pub(crate) fill_jammed: bool,
     signal: (u32, u32, u32),
@@ -79,6 +80,7 @@ impl Muscle {
             volume: 1.0,
             widening: 0.0,
             leak: 0.0,
+            closes_s: CLOSES_S,
             fill_jammed: false,
             signal: (0, 0, 1),
             since_us: 0,
@@ -106,14 +108,14 @@ impl Muscle {
             Valves::Vent => (self.signal, self.since_us) = ((0, 1_000, 1_000), 0),
             Valves::Closed | Valves::Absent => (self.signal, self.since_us) = ((0, 0, 1_000), 0),
         }
-        let dead_s = f64::from(self.valves.dead_s);
+        let delays_s = [CLOSES_S + f64::from(self.valves.dead_s), self.closes_s];
         let supply = f64::from(self.valves.supply_pa) + ATMOSPHERE;
         for _ in 0..(1e-3 / STEP_S) as u32 {
             let (fill_us, vent_us, length_us) = self.signal;
             let in_pulse = |time_us: u32| self.since_us >= length_us - time_us && self.since_us < length_us;
             let inside = self.pressure_pa() + ATMOSPHERE;
-            self.gas += self.fill.through(in_pulse(fill_us) || self.fill_jammed, dead_s, supply, inside);
-            self.gas -= self.vent.through(in_pulse(vent_us), dead_s, inside, ATMOSPHERE);
+            self.gas += self.fill.through(in_pulse(fill_us) || self.fill_jammed, delays_s, supply, inside);
+            self.gas -= self.vent.through(in_pulse(vent_us), delays_s, inside, ATMOSPHERE);
             self.gas -= self.leak * (inside - ATMOSPHERE) * STEP_S;
             self.both_open += u32::from(self.fill.open && self.vent.open);
             self.volume += self.widening * STEP_S;

@@ -50,7 +50,12 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
         ),
         Refusal::Value(field) => (
             format!("{} is out of range or not a number", field_name(field)),
-            "`host device settings` shows the values in force".to_owned(),
+            match field {
+                Field::Valves => "a pair of valves needs a board with outputs for it, a pressure sensor, `regulator.lag_s` of two \
+                                  periods or more, and a supply above `regulator.command_max_pa`; the book lists the ranges"
+                    .to_owned(),
+                _ => "`host device settings` shows the values in force".to_owned(),
+            },
         ),
         Refusal::Table(why) => return table_refused(why),
         Refusal::Store(why) => (
@@ -201,6 +206,9 @@ mod tests {
         let error =
             refused("set_point", Refusal::Stiffness { low_nm_per_rad: 25.04, high_nm_per_rad: 29.96 });
         assert!(error.to_string().ends_with("stiffness is 25.0 to 30.0 N·m/rad at this angle"), "{error}");
+        let error = refused("set_settings", Refusal::Value(Field::Valves));
+        assert!(error.to_string().contains("the setting `valves`"), "{error}");
+        assert!(error.advice().is_some_and(|advice| advice.contains("a board with outputs for it")));
         let error = refused("set_point", Refusal::Angle { low_rad: -0.1, high_rad: 0.1 });
         assert!(error.to_string().ends_with("taut from -5.7° to 5.7° only"), "{error}");
     }
