@@ -133,7 +133,7 @@ static inline const uint8_t *pam_unframe(uint8_t *bytes, size_t length, uint8_t 
 }
 
 #define PAM_LINK_VERSION 6
-#define PAM_SCHEMA_HASH UINT64_C(0x08000e53b3d08844)
+#define PAM_SCHEMA_HASH UINT64_C(0xb818ffa881a7cd33)
 
 #define PAM_INFO 1 /* unit → pam_device_info */
 #define PAM_STATUS 2 /* unit → pam_status */
@@ -747,7 +747,29 @@ static inline void pam_read_command_output(pam_reader *r, pam_command_output *m)
   (*m).full_pa = pam_get_f32(r);
 }
 
-typedef struct { pam_feed_forward feed_forward; pam_force_loop force_loop; pam_stroke_loop stroke_loop; pam_joint joint; pam_regulator regulator; pam_limits limits; pam_sensor_watch pressure; pam_sensor_watch stroke; pam_sensor_watch force; pam_watch watch; uint32_t hold_on; float motion_band_m; float pressure_band_pa; pam_scales scales; pam_command_output command; } pam_settings;
+typedef struct { uint16_t period_ticks; float supply_pa; float fill_pa_per_s; float vent_pa_per_s; float dead_s; float least_s; float apart_s; float band_pa; } pam_valve_pair;
+static inline void pam_write_valve_pair(pam_writer *w, const pam_valve_pair *m) {
+  pam_put_varint(w, (*m).period_ticks);
+  pam_put_f32(w, (*m).supply_pa);
+  pam_put_f32(w, (*m).fill_pa_per_s);
+  pam_put_f32(w, (*m).vent_pa_per_s);
+  pam_put_f32(w, (*m).dead_s);
+  pam_put_f32(w, (*m).least_s);
+  pam_put_f32(w, (*m).apart_s);
+  pam_put_f32(w, (*m).band_pa);
+}
+static inline void pam_read_valve_pair(pam_reader *r, pam_valve_pair *m) {
+  (*m).period_ticks = (uint16_t)pam_get_varint(r, UINT16_MAX);
+  (*m).supply_pa = pam_get_f32(r);
+  (*m).fill_pa_per_s = pam_get_f32(r);
+  (*m).vent_pa_per_s = pam_get_f32(r);
+  (*m).dead_s = pam_get_f32(r);
+  (*m).least_s = pam_get_f32(r);
+  (*m).apart_s = pam_get_f32(r);
+  (*m).band_pa = pam_get_f32(r);
+}
+
+typedef struct { pam_feed_forward feed_forward; pam_force_loop force_loop; pam_stroke_loop stroke_loop; pam_joint joint; pam_regulator regulator; pam_limits limits; pam_sensor_watch pressure; pam_sensor_watch stroke; pam_sensor_watch force; pam_watch watch; uint32_t hold_on; float motion_band_m; float pressure_band_pa; pam_scales scales; pam_command_output command; pam_valve_pair valves; } pam_settings;
 static inline void pam_write_settings(pam_writer *w, const pam_settings *m) {
   pam_write_feed_forward(w, &(*m).feed_forward);
   pam_write_force_loop(w, &(*m).force_loop);
@@ -764,6 +786,7 @@ static inline void pam_write_settings(pam_writer *w, const pam_settings *m) {
   pam_put_f32(w, (*m).pressure_band_pa);
   pam_write_scales(w, &(*m).scales);
   pam_write_command_output(w, &(*m).command);
+  pam_write_valve_pair(w, &(*m).valves);
 }
 static inline void pam_read_settings(pam_reader *r, pam_settings *m) {
   pam_read_feed_forward(r, &(*m).feed_forward);
@@ -781,6 +804,7 @@ static inline void pam_read_settings(pam_reader *r, pam_settings *m) {
   (*m).pressure_band_pa = pam_get_f32(r);
   pam_read_scales(r, &(*m).scales);
   pam_read_command_output(r, &(*m).command);
+  pam_read_valve_pair(r, &(*m).valves);
 }
 
 typedef struct { pam_side side; uint32_t length; uint32_t crc; } pam_table_begin;
@@ -1219,12 +1243,12 @@ static inline void pam_read_event(pam_reader *r, pam_event *m) {
   }
 }
 
-typedef enum { PAM_FIELD_SET_POINT = 0, PAM_FIELD_REFERENCE = 1, PAM_FIELD_FORCE_LOOP = 2, PAM_FIELD_STROKE_LOOP = 3, PAM_FIELD_JOINT = 4, PAM_FIELD_REGULATOR = 5, PAM_FIELD_LIMITS = 6, PAM_FIELD_SENSOR_WATCH = 7, PAM_FIELD_WATCH = 8, PAM_FIELD_BANDS = 9, PAM_FIELD_RATE = 10, PAM_FIELD_SCALE = 11, PAM_FIELD_COMMAND = 12 } pam_field;
+typedef enum { PAM_FIELD_SET_POINT = 0, PAM_FIELD_REFERENCE = 1, PAM_FIELD_FORCE_LOOP = 2, PAM_FIELD_STROKE_LOOP = 3, PAM_FIELD_JOINT = 4, PAM_FIELD_REGULATOR = 5, PAM_FIELD_LIMITS = 6, PAM_FIELD_SENSOR_WATCH = 7, PAM_FIELD_WATCH = 8, PAM_FIELD_BANDS = 9, PAM_FIELD_RATE = 10, PAM_FIELD_SCALE = 11, PAM_FIELD_COMMAND = 12, PAM_FIELD_VALVES = 13 } pam_field;
 static inline void pam_write_field(pam_writer *w, const pam_field *m) {
   pam_put_varint(w, (uint64_t)*m);
 }
 static inline void pam_read_field(pam_reader *r, pam_field *m) {
-  *m = (pam_field)pam_get_varint(r, 12);
+  *m = (pam_field)pam_get_varint(r, 13);
 }
 
 enum { PAM_TABLE_FAULT_NOT_BEGUN = 0, PAM_TABLE_FAULT_GAP = 1, PAM_TABLE_FAULT_TOO_LONG = 2, PAM_TABLE_FAULT_INCOMPLETE = 3, PAM_TABLE_FAULT_CHECK = 4, PAM_TABLE_FAULT_VERSION = 5, PAM_TABLE_FAULT_MALFORMED = 6, PAM_TABLE_FAULT_NOT_FINITE = 7, PAM_TABLE_FAULT_NOT_ORDERED = 8, PAM_TABLE_FAULT_OUT_OF_RANGE = 9, PAM_TABLE_FAULT_UNKNOWN_EFFECT = 10 };

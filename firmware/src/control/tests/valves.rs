@@ -73,10 +73,10 @@ const RESOLUTION_PA: f64 = 2.5e3;
 
 #[test]
 fn pressure_is_within_five_percent_of_a_step_after_four_lags_and_then_within_the_resolution() {
-    for ticks in [5, 10, 15] {
+    for ticks in [5, 10, 14] {
         let mut it = Loop::running(|s| s.valves.period_ticks = ticks);
         let mut from = 0.0;
-        for to in [200e3, 400e3, 300e3, 100e3] {
+        for to in [200e3, 400e3, 300e3, 200e3] {
             it.to(to);
             let to = f64::from(to);
             let course: Vec<f64> = (0..400)
