@@ -24,11 +24,12 @@ mod names;
 mod roles;
 mod runs;
 mod sample;
+mod stroke;
 mod text;
 mod time;
 mod values;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::quantity::Quantity;
 use crate::error::Result;
@@ -130,13 +131,32 @@ pub(super) fn is_reading_of(name: &str, quantity: Quantity) -> bool {
     names::Name::of(name).quantity().is_some_and(|(named, _)| named == quantity)
 }
 
+/// Files besides the first whose lengths are compared with its own.
+const COMPARED: usize = 30;
+
 /// Looks at a file and describes it.
 ///
 /// # Errors
 /// A file that cannot be read, or that holds no table.
 pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
+    guess_among(path, &[], sheet)
+}
+
+/// Looks at a file and describes it. Other files of the same bench show whether a length was held in each of them.
+///
+/// # Errors
+/// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
+pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let mut guess = roles::assign(path, &sample);
+    let range = |file: &PathBuf, header: &str| {
+        // What a pipe gives once is left for the reader.
+        let sample = file.is_file().then(|| Sample::read(file, sheet).ok())??;
+        sample.columns.iter().find(|c| c.header == header).map(sample::SampleColumn::range)
+    };
+    let ranges = |header: &str| -> Vec<(f64, f64)> {
+        others.iter().take(COMPARED).filter_map(|file| range(file, header)).collect()
+    };
+    let mut guess = roles::assign(path, &sample, &ranges);
     guess.description = text::description(&guess);
     Ok(guess)
 }
