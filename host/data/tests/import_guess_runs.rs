@@ -83,3 +83,24 @@ fn a_column_that_comes_back_to_earlier_values_sets_nothing_apart() {
     let (guess, recordings) = read(&[("all.csv", text)]);
     assert!(guess.split_by.is_empty() && recordings.len() == 1, "{}", guess.description);
 }
+
+#[test]
+fn a_held_length_is_taken_from_the_names_of_the_files() {
+    let rows = |mm| staircase(0, mm, "").replace(&format!(",{mm},"), ",");
+    let file = |mm| format!("time_s,pressure_kPa,force_N\n{}", rows(mm));
+    let (guess, recordings) = read(&[
+        ("festo10mm_182mm_run1.csv", file(0.25)),
+        ("festo10mm_159.5mm_run1.csv", file(22.5)),
+        ("festo10mm_174.5 mm.csv", file(7.5)),
+    ]);
+    assert!(guess.unknown.is_empty(), "{:?}", guess.unknown);
+    assert_eq!(strokes_mm(&recordings), [18.0, 40.5, 25.5], "{}", guess.description);
+    // A diameter alone is no length.
+    let unknown = |names: [&str; 2]| {
+        let folder = tempfile::tempdir().unwrap();
+        let paths = names.map(|name| folder.path().join(name));
+        paths.iter().for_each(|path| std::fs::write(path, file(0.25)).unwrap());
+        guess_among(&paths[0], &paths[1..], None).unwrap().unknown.join("; ")
+    };
+    assert!(unknown(["festo10mm_run1.csv", "festo10mm_run2.csv"]).contains("no column of displacement"));
+}

@@ -20,7 +20,9 @@
 mod absolute;
 mod layout;
 mod lookup;
+mod named_length;
 mod names;
+mod others;
 mod roles;
 mod runs;
 mod sample;
@@ -34,6 +36,7 @@ use std::path::{Path, PathBuf};
 use super::quantity::Quantity;
 use crate::error::Result;
 use lookup::Listed;
+use others::Others;
 use sample::Sample;
 
 /// Where a column of a description is.
@@ -131,9 +134,6 @@ pub(super) fn is_reading_of(name: &str, quantity: Quantity) -> bool {
     names::Name::of(name).quantity().is_some_and(|(named, _)| named == quantity)
 }
 
-/// Files besides the first whose lengths are compared with its own.
-const COMPARED: usize = 30;
-
 /// Looks at a file and describes it.
 ///
 /// # Errors
@@ -142,21 +142,14 @@ pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
     guess_among(path, &[], sheet)
 }
 
-/// Looks at a file and describes it. Other files of the same bench show whether a length was held in each of them.
+/// Looks at a file and describes it. Other files of the same bench show whether a length was held in each of them,
+/// and their names may say which one.
 ///
 /// # Errors
 /// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
 pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let range = |file: &PathBuf, header: &str| {
-        // What a pipe gives once is left for the reader.
-        let sample = file.is_file().then(|| Sample::read(file, sheet).ok())??;
-        sample.columns.iter().find(|c| c.header == header).map(sample::SampleColumn::range)
-    };
-    let ranges = |header: &str| -> Vec<(f64, f64)> {
-        others.iter().take(COMPARED).filter_map(|file| range(file, header)).collect()
-    };
-    let mut guess = roles::assign(path, &sample, &ranges);
+    let mut guess = roles::assign(path, &sample, &Others { files: others, sheet });
     guess.description = text::description(&guess);
     Ok(guess)
 }

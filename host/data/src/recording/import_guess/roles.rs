@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::lookup;
 use super::names::{Family, Name, Score};
+use super::others::Others;
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, Source, absolute, runs, stroke, time, values};
+use super::{Guess, GuessedColumn, Source, absolute, named_length, runs, stroke, time, values};
 use crate::recording::Quantity;
 use crate::short_number::short;
 
-/// Decides on every column. `others` are the least and greatest readings of a column in each of the other files of the bench.
-pub(super) fn assign(path: &Path, sample: &Sample, others: &dyn Fn(&str) -> Vec<(f64, f64)>) -> Guess {
+/// Decides on every column.
+pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess {
     let mut guess = Guess {
         file: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         rows: sample.rows,
@@ -54,6 +55,7 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &dyn Fn(&str) -> Vec<
     time::find(sample, &mut used, &mut guess);
     find_pressure(sample, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
+    named_length::find(others, &mut guess);
     stroke::judge(sample, others, &mut guess);
     absolute::ask(sample, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
@@ -341,14 +343,16 @@ fn what_is_missing(sample: &Sample, guess: &mut Guess) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
         guess.unknown.insert(0, text.to_owned());
     }
-    if !guess.has(Quantity::Pressure) && guess.patterns.is_empty() {
+    let caught =
+        |guess: &Guess, name: &str| guess.patterns.iter().any(|(_, p)| p.contains(&format!("<{name}_")));
+    if !guess.has(Quantity::Pressure) && !caught(guess, "pressure") {
         let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants]";
         guess.unknown.push(text.to_owned());
     }
     let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
-    if !stroke.iter().any(|q| guess.has(*q)) {
+    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, q.name())) {
         let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
-                    under [constants]";
+                    under [constants], or give the files of all lengths, whose names say it";
         guess.unknown.push(text.to_owned());
     }
     if !guess.has(Quantity::Force) {

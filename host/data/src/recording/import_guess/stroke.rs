@@ -1,5 +1,6 @@
 //! The sign and the zero of a displacement, by its name, by the force, and by what other files of the bench hold.
 
+use super::others::Others;
 use super::sample::{Sample, SampleColumn};
 use super::{Guess, GuessedColumn, roles, values};
 use crate::recording::Quantity;
@@ -11,8 +12,8 @@ const SHOWN: f64 = 0.8;
 /// A displacement that varies by less than this share of itself is held: a frame yields by so much, and no stroke is so short.
 const HELD: f64 = 0.01;
 
-/// Decides on the displacement. `others` are the least and greatest readings of a column in each of the other files of the bench.
-pub(super) fn judge(sample: &Sample, others: &dyn Fn(&str) -> Vec<(f64, f64)>, guess: &mut Guess) {
+/// Decides on the displacement.
+pub(super) fn judge(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
     sign(sample, guess);
     let is_stroke = |c: &&mut GuessedColumn| c.quantity == Quantity::Displacement;
     let Some(column) = guess.columns.iter_mut().find(is_stroke) else { return };
@@ -38,11 +39,11 @@ pub(super) fn judge(sample: &Sample, others: &dyn Fn(&str) -> Vec<(f64, f64)>, g
 }
 
 /// How a displacement shows that it is held and not moved: counted from the greatest length in each file, nothing would be left of it.
-fn held(header: &str, (low, high): (f64, f64), others: &dyn Fn(&str) -> Vec<(f64, f64)>) -> Option<String> {
+fn held(header: &str, (low, high): (f64, f64), others: &Others<'_>) -> Option<String> {
     if high - low > HELD * low.abs().max(high.abs()) {
         return None;
     }
-    let others = others(header);
+    let others = others.ranges(header);
     let within = others.iter().map(|(l, h)| h - l).fold(high - low, f64::max);
     let ends = others.iter().fold((low, high), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
     Some(if ends.1 - ends.0 > within {
