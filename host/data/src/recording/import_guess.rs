@@ -20,19 +20,23 @@
 mod absolute;
 mod layout;
 mod lookup;
+mod named_length;
 mod names;
+mod others;
 mod roles;
 mod runs;
 mod sample;
+mod stroke;
 mod text;
 mod time;
 mod values;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::quantity::Quantity;
 use crate::error::Result;
 use lookup::Listed;
+use others::Others;
 use sample::Sample;
 
 /// Where a column of a description is.
@@ -135,8 +139,17 @@ pub(super) fn is_reading_of(name: &str, quantity: Quantity) -> bool {
 /// # Errors
 /// A file that cannot be read, or that holds no table.
 pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
+    guess_among(path, &[], sheet)
+}
+
+/// Looks at a file and describes it. Other files of the same bench show whether a length was held in each of them,
+/// and their names may say which one.
+///
+/// # Errors
+/// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
+pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let mut guess = roles::assign(path, &sample);
+    let mut guess = roles::assign(path, &sample, &Others { files: others, sheet });
     guess.description = text::description(&guess);
     Ok(guess)
 }
