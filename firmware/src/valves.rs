@@ -34,7 +34,7 @@ pub enum Valves {
     /// No pair is fitted.
     #[default]
     Absent,
-    /// The period that has begun goes on.
+    /// The period that has begun continues.
     Continue,
     /// A period begins. Each valve opens for its time, at the period's end; behind the period both are closed.
     Period {

@@ -302,7 +302,7 @@ class Chip:
             self.event = False
             uc.reg_write(UC_ARM_REG_PC, pc + 2 | 1)
             return
-        self._returns = False
+        self._returns, self._short = False, False
         ahead = (self.events[0][0] - self.now if self.events else 1.0) * self.hz / self.cycles
         count = SHORT if self.pending & self.enabled else max(SHORT, min(LONG, int(ahead)))
         try:
@@ -310,10 +310,16 @@ class Chip:
         except UcError:
             self._stopped()
         self.flash.settle()
+        count = SHORT if self._short else count
         self.now += count * self.cycles / self.hz
         self.instructions += count
         if self.active and uc.reg_read(UC_ARM_REG_PC) >= 0xFFFFFF00:
             self._leave()
+
+    def end_slice(self):
+        """Ends a slice within a read, which is then read again: an interrupt that waits is taken first."""
+        self._short = True
+        self.uc.emu_stop()
 
     def _stopped(self):
         """Unicorn stopped without a request: asleep, back from an interrupt, or somewhere without memory."""

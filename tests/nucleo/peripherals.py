@@ -138,7 +138,10 @@ class Flash(Registers):
         self.cut = False
 
     def read(self, offset):
-        self.settle()
+        if self.pending:
+            # The processor has stood still for a word: an interrupt that came meanwhile is taken before the next one.
+            self.settle()
+            self.chip.end_slice()
         return self.errors if offset == 0x0C else self.get(offset)
 
     def write(self, offset, value):

@@ -75,7 +75,7 @@ class Outputs(unittest.TestCase):
         changes = board.chip.valves[before:]
         number = next(at for at, change in enumerate(changes) if change[1])
         closed, filled, ended = (changes[number + step][0] for step in (-1, 0, 1))
-        # More is wanted than the valve gives: 2 ms for the vent valve to close, then all of the period. A write takes its time.
+        # The setpoint needs more than the valve gives: 2 ms for the vent valve to close, then all of the period. A write takes its time.
         self.assertAlmostEqual(filled - closed, 2e-3, delta=50e-6)
         self.assertEqual(changes[number - 1][1:], (False, False))
         self.assertGreater(ended - filled, 7.9e-3)

@@ -25,7 +25,7 @@ class ValveTimer(Registers):
 
     def count(self):
         count = int((self.chip.now - self.since) * self.rate() + 1e-6) if self.counts() else 0
-        # Behind the period it stands at zero, also before its end has been handled here.
+        # Behind the period it is zero, also before its end has been handled here.
         return count if count <= self.get(self.RELOAD) else 0
 
     def read(self, offset):

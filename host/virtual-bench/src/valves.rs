@@ -42,7 +42,7 @@ pub struct Open {
     pub fill: bool,
     /// The vent valve.
     pub vent: bool,
-    /// The dump valve, which follows its signal at once.
+    /// The dump valve, which follows its signal immediately.
     pub dump: bool,
 }
 

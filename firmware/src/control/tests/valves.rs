@@ -7,7 +7,7 @@ use crate::board::Hardware;
 use crate::valves::Valves;
 use crate::valves::bench::Muscle;
 
-/// The loop and the muscle between its valves. There is no dump valve.
+/// The loop and the muscle between its valves, without a dump valve.
 struct Loop {
     controller: Controller,
     muscle: Muscle,
@@ -107,7 +107,7 @@ fn pressure_follows_a_ramp_within_five_kilopascals() {
         let wanted = 100e3 + 400.0 * if tick < 1_000 { tick } else { 2_000 - tick } as f32;
         it.to(wanted);
         it.pass(1);
-        // At the turn the lead of the regulator's model needs some lags.
+        // After the reversal the lead of the regulator's model needs some lags.
         if tick % 1_000 > 200 {
             worst = worst.max((it.muscle.pressure_pa() - f64::from(wanted)).abs());
         }
@@ -179,9 +179,9 @@ fn a_jammed_fill_valve_is_a_fault() {
     assert_eq!(it.pass_with(|_| ()).valves[0], Valves::Vent);
 }
 
-/// An outer loop that goes on while the valves are as far open as they can be would go beyond afterwards.
+/// An outer loop that continues while the valves are as far open as they can be would overshoot afterwards.
 #[test]
-fn while_the_valves_cannot_follow_no_integrator_goes_on() {
+fn while_the_valves_cannot_follow_no_integrator_continues() {
     let mut it = Loop::running(|s| (s.valves.fill_pa_per_s, s.valves.vent_pa_per_s) = (200e3, 200e3));
     it.to(400e3);
     it.pass(100);
