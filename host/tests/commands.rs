@@ -269,7 +269,7 @@ fn the_second_name_is_the_same_program() {
         Command::new(env!("CARGO_BIN_EXE_pam")).args(["table", "check", "none.pam"]).output().unwrap();
     let text = String::from_utf8(missing.stderr).unwrap();
     assert!(text.contains("`pam fit`") && !text.contains("`host"), "{text}");
-    // So does the advice on pages.
+    // The advice on pages does, too.
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let muscle = Muscle::<f64>::build(&model_core::table::example()).unwrap();

@@ -29,7 +29,7 @@ pub const LARGEST_CONTRACTION: f64 = 0.4;
 /// Pressure rate while nothing is recorded, share of the highest level per second.
 pub const RAMP_SHARE: f64 = 0.2;
 /// Pressure rate between the levels of the survey, share of the highest level per second, and the rest at each level, s: a tenth of a
-/// second's lag and its decay are over by then, and creep matters less than time while there is no table.
+/// second's lag and its decay are over by then, and creep matters less than time before there is a table.
 pub const SURVEY_RAMP_SHARE: f64 = 0.4;
 /// See [`SURVEY_RAMP_SHARE`].
 pub const SURVEY_HOLD: f64 = 1.0;

@@ -104,3 +104,27 @@ fn a_held_length_is_taken_from_the_names_of_the_files() {
     };
     assert!(unknown(["festo10mm_run1.csv", "festo10mm_run2.csv"]).contains("no column of displacement"));
 }
+
+#[test]
+fn a_displacement_that_falls_with_rising_pressure_grows_as_the_muscle_gets_longer() {
+    let rows = (0..80).fold(String::new(), |mut text, i| {
+        let bar = 0.1 * f64::from(40 - (i - 40_i32).abs());
+        writeln!(text, "{i},{bar},{}", -0.1 - 3.0 * bar).unwrap();
+        text
+    });
+    let (guess, recordings) = read(&[("lifted.csv", format!("t_s,pressure_bar,displacement_mm\n{rows}"))]);
+    assert!((recordings[0].stroke[40] - 12e-3).abs() < 0.2e-3, "{}", guess.description);
+    assert!(
+        guess.checks.iter().any(|c| c.starts_with("the pressure falls with displacement_mm")),
+        "{:?}",
+        guess.checks
+    );
+    // What a regulator lets the pressure fall by says nothing.
+    let rows = rows.replace(",", ", ");
+    let held = rows.lines().fold(String::new(), |text, row| {
+        let cells: Vec<f64> = row.split(", ").map(|cell| cell.parse().unwrap()).collect();
+        text + &format!("{},{},{}\n", cells[0], 3.0 + 0.01 * cells[1], cells[2])
+    });
+    let (guess, _) = read(&[("held.csv", format!("t_s,pressure_bar,displacement_mm\n{held}"))]);
+    assert!(!guess.checks.iter().any(|c| c.contains("the pressure falls")), "{:?}", guess.checks);
+}

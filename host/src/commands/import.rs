@@ -177,7 +177,9 @@ fn to_text(guess: &Guess, recordings: &[&Recording], usual: bool) -> String {
             lines.iter().for_each(|line| text += &format!("  - {line}\n"));
         }
     }
-    if usual && guess.split_by.is_empty() {
+    if usual && !guess.only_names() {
+        text += "this file is read without an import description, too, but not with these signs, zeros and runs\n";
+    } else if usual {
         text += "this file is read without an import description\n";
     }
     text.trim_end().to_owned()
@@ -234,7 +236,7 @@ fn to_document(guess: &Guess, recordings: &[&Recording], usual: bool) -> documen
     document::Import {
         schema: "pam-import/1",
         file: guess.file.clone(),
-        usual,
+        usual: usual && guess.only_names(),
         rows: guess.rows,
         columns: columns.collect(),
         split_by: guess.split_by.clone(),

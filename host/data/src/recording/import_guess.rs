@@ -122,6 +122,17 @@ impl Guess {
         self.lookup.as_ref().map(|l| l.file.as_str())
     }
 
+    /// Whether the description says no more than names and units: signs, zeros, offsets, runs and constants are as they are without it.
+    #[must_use]
+    pub fn only_names(&self) -> bool {
+        let plain = |c: &GuessedColumn| {
+            let scaled = c.scale != 1.0 || c.offset != 0.0;
+            !(scaled || c.extension || c.from_longest || !c.values.is_empty())
+        };
+        let whole = self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
+        whole && self.lookup.is_none() && self.columns.iter().all(plain)
+    }
+
     /// Whether a quantity was found.
     #[must_use]
     pub fn has(&self, quantity: Quantity) -> bool {

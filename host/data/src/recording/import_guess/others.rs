@@ -1,4 +1,4 @@
-//! The other files of the same bench: what one file leaves open, several may show.
+//! The other files of the same bench: they may show what is uncertain from one file.
 
 use std::path::{Path, PathBuf};
 

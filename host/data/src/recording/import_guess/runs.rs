@@ -45,7 +45,7 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
     (chosen, left)
 }
 
-/// Columns called run, mounting or so that number the runs of a file whose clock goes on: together they never come back to an earlier
+/// Columns called run, mounting or so that number the runs of a file whose clock continues: together they never come back to an earlier
 /// value. Joined into one recording, runs at different held lengths would look like motion.
 fn numbered(columns: &[SampleColumn]) -> Vec<usize> {
     let named =

@@ -1,4 +1,4 @@
-//! The sign and the zero of a displacement, by its name, by the force, and by what other files of the bench hold.
+//! The sign and the zero of a displacement, by its name, by force and pressure, and by what other files of the bench hold.
 
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
@@ -53,7 +53,7 @@ fn held(header: &str, (low, high): (f64, f64), others: &Others<'_>) -> Option<St
     })
 }
 
-/// The sign, which the force shows.
+/// The sign, which the force shows, or the pressure where the force shows nothing.
 fn sign(sample: &Sample, guess: &mut Guess) {
     let values = |q: Quantity| {
         let column = guess.columns.iter().find(|c| c.quantity == q)?;
@@ -72,24 +72,33 @@ fn sign(sample: &Sample, guess: &mut Guess) {
     };
     let force = force.or_else(raw);
     let pressure = values(Quantity::Pressure).map(|(_, p)| p.as_slice());
-    let shown = force.and_then(|f| values::force_against(stroke, &f, pressure));
+    let by_force =
+        force.and_then(|f| values::force_against(stroke, &f, pressure)).filter(|r| r.abs() > SHOWN);
+    // A muscle that moves freely shortens as its pressure rises.
+    let by_pressure =
+        || pressure.and_then(|p| values::pressure_against(stroke, p)).filter(|r| r.abs() > SHOWN);
+    let (lengthens, how) = match by_force {
+        Some(r) => (r > 0.0, ["rises", "falls"].map(|way| format!("the force {way} with"))),
+        None => match by_pressure() {
+            Some(r) => (r < 0.0, ["falls", "rises"].map(|way| format!("the pressure {way} with"))),
+            None => return,
+        },
+    };
     let Some(column) = guess.columns.iter_mut().find(|c| c.quantity == Quantity::Displacement) else {
         return;
     };
-    let header = column.header.clone();
-    match shown {
-        Some(r) if r > SHOWN && !column.extension => {
-            column.extension = true;
-            guess.checks.push(format!(
-                "the force rises with {header} at equal pressure: it is taken to grow as the muscle gets longer"
-            ));
-        }
-        Some(r) if r < -SHOWN && column.extension => {
-            column.extension = false;
-            guess.checks.push(format!(
-                "the force falls with {header} at equal pressure: it is taken to grow as the muscle shortens, despite its name"
-            ));
-        }
-        _ => {}
+    if column.extension == lengthens {
+        return;
     }
+    column.extension = lengthens;
+    let at = if by_force.is_some() { " at equal pressure" } else { "" };
+    let [longer, shorter] = how;
+    guess.checks.push(if lengthens {
+        format!("{longer} {}{at}: it is taken to grow as the muscle gets longer", column.header)
+    } else {
+        format!(
+            "{shorter} {}{at}: it is taken to grow as the muscle shortens, despite its name",
+            column.header
+        )
+    });
 }
