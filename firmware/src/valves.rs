@@ -73,7 +73,7 @@ impl Default for PairOfValves {
 /// `ψ`: part of the choked flow at a ratio of pressures behind and before a valve.
 fn flow(ratio: f32) -> f32 {
     let past = ((ratio - CRITICAL) / (1.0 - CRITICAL)).within(0.0, 1.0);
-    (1.0 - past * past).sqrt()
+    (1.0 - past * past).at_least(0.0).sqrt()
 }
 
 /// Rate of pressure through an open valve, Pa/s: `fills`, or vents.
