@@ -204,7 +204,8 @@ fn a_pair_of_valves_has_room_in_its_period_supply_for_its_command_and_a_quick_fi
             change(s, value);
         })
     };
-    let edges: [(fn(&mut Settings, f32), f32, f32); 5] = [
+    type Change = fn(&mut Settings, f32);
+    let edges: [(Change, f32, f32); 5] = [
         (|s, v| s.valves.dead_s = v, 4.9e-3, 5.1e-3),
         (|s, v| s.valves.least_s = v, 4.9e-3, 5.1e-3),
         (|s, v| s.valves.apart_s = v, 5.9e-3, 6.1e-3),
