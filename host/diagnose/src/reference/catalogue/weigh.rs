@@ -25,6 +25,8 @@ pub(super) struct Fit {
     columns: Vec<DVector<f64>>,
     /// What it adds to the cells, N.
     pub trace: DVector<f64>,
+    /// Which of its alternative laws.
+    law: Option<usize>,
     shapes: Vec<f64>,
 }
 
@@ -50,13 +52,29 @@ pub(super) struct Weighed {
     pub alone: Vec<Fit>,
 }
 
-/// An effect at one set of shapes; `None` where the cells do not show it.
-fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]) -> Option<Fit> {
-    let columns: Vec<DVector<f64>> =
-        candidate.columns(shapes, &cells.rows).iter().map(|c| cells.means(c)).collect();
+/// The laws of an effect: each amplitude alone where they are alternatives, otherwise all together.
+fn laws(candidate: &Candidate) -> Vec<Option<usize>> {
+    let amplitudes = candidate.signs().len();
+    if candidate.info.alternatives { (0..amplitudes).map(Some).collect() } else { vec![None] }
+}
+
+/// The columns of an effect at one set of shapes, N per unit of each amplitude.
+fn columns(cells: &Cells, candidate: &Candidate, shapes: &[f64]) -> Vec<DVector<f64>> {
+    candidate.columns(shapes, &cells.rows).iter().map(|c| cells.means(c)).collect()
+}
+
+/// One law of an effect at one set of shapes; `None` where the cells do not show it.
+fn fit(
+    cells: &Cells,
+    metric: &Metric<'_>,
+    candidate: &Candidate,
+    (law, shapes): (Option<usize>, &[f64]),
+    columns: &[DVector<f64>],
+) -> Option<Fit> {
     let n = cells.cells.len() as f64;
     let rms: Vec<f64> = columns.iter().map(|c| (c.norm_squared() / n).sqrt()).collect();
-    let live: Vec<usize> = (0..columns.len()).filter(|k| rms[*k] > 0.0 && rms[*k].is_finite()).collect();
+    let own = |k: &usize| law.is_none_or(|l| l == *k) && rms[*k] > 0.0 && rms[*k].is_finite();
+    let live: Vec<usize> = (0..columns.len()).filter(own).collect();
     if live.is_empty() {
         return None;
     }
@@ -89,7 +107,7 @@ fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]
     let mut parameters: Vec<_> = Vec::new();
     let amplitudes =
         candidate.info.parameters.iter().filter(|p| matches!(p.role, model_core::effects::Role::Amplitude));
-    for (i, p) in amplitudes.enumerate() {
+    for (i, p) in amplitudes.enumerate().filter(|(i, _)| law.is_none_or(|l| l == *i)) {
         let (value, std) = live
             .iter()
             .position(|l| *l == i)
@@ -99,22 +117,30 @@ fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]
     parameters.extend(candidate.shapes().zip(shapes).map(|(p, s)| (p.name, p.unit, *s, 0.0)));
     let change = Change::from_name(candidate.name())?;
     let columns = live.iter().map(|k| columns[*k].clone()).collect();
-    Some(Fit { change, log, parameters, columns, trace, shapes: shapes.to_vec() })
+    Some(Fit { change, log, parameters, columns, trace, law, shapes: shapes.to_vec() })
 }
 
-/// The best shape of one effect, and the log share of the grid that its evidence is a mean over.
+/// The best law and shape of one effect, and the log share of the laws and shapes that its evidence is a mean over.
 fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fit, f64)> {
     let grid = candidate.grid();
-    let fits: Vec<Fit> = grid.iter().filter_map(|shapes| fit(cells, metric, candidate, shapes)).collect();
+    let laws = laws(candidate);
+    let at = |shapes: &Vec<f64>| -> Vec<Fit> {
+        let columns = columns(cells, candidate, shapes);
+        laws.iter().filter_map(|law| fit(cells, metric, candidate, (*law, shapes), &columns)).collect()
+    };
+    let fits: Vec<Fit> = grid.iter().flat_map(at).collect();
     let logs: Vec<f64> = fits.iter().map(|f| f.log).collect();
-    let mean = log_sum(&logs) - (grid.len().max(1) as f64).ln();
+    let mean = log_sum(&logs) - ((grid.len() * laws.len()).max(1) as f64).ln();
     let mut best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
     let (coarse, mut step) = (best.log, 0.06);
     for _ in 0..CATALOGUE_REFINED {
         let near = candidate.neighbours(&best.shapes, step);
+        let law = |shapes: &Vec<f64>| {
+            fit(cells, metric, candidate, (best.law, shapes), &columns(cells, candidate, shapes))
+        };
         let better = near
             .iter()
-            .filter_map(|shapes| fit(cells, metric, candidate, shapes))
+            .filter_map(law)
             .max_by(|a, b| a.log.total_cmp(&b.log))
             .filter(|f| f.log > best.log);
         match better {
@@ -134,7 +160,8 @@ fn with_own_error(
     (found, least): (Fit, &[f64]),
 ) -> Fit {
     let metric = Metric::of(cells, usual, &with_error(&cells.group, &found.trace, least));
-    let Some(own) = fit(cells, &metric, candidate, &found.shapes) else { return found };
+    let columns = columns(cells, candidate, &found.shapes);
+    let Some(own) = fit(cells, &metric, candidate, (found.law, &found.shapes), &columns) else { return found };
     Fit { log: own.log + metric.density, ..own }
 }
 
@@ -260,6 +287,7 @@ mod tests {
                 parameters: Vec::new(),
                 columns: Vec::new(),
                 trace: DVector::zeros(1),
+                law: None,
                 shapes: Vec::new(),
             };
             (fit, *p)
