@@ -9,6 +9,7 @@
 mod answer;
 mod cells;
 mod metric;
+mod pieces;
 mod rests;
 mod weigh;
 

@@ -5,19 +5,20 @@ use rayon::prelude::*;
 
 use super::super::contrast::{log_mean, log_sum};
 use super::super::criteria::{
-    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_REFINED, CATALOGUE_USUAL, MOST_CHANGES, NAMED,
-    PRIOR_UNKNOWN, SIZES,
+    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_LAW_ERRORS, CATALOGUE_REFINED, CATALOGUE_USUAL,
+    MOST_CHANGES, NAMED, PRIOR_UNKNOWN, SIZES,
 };
 use super::super::shapes::{Change, Class};
 use super::cells::Cells;
 use super::metric::{Metric, is_same, usual, with_error};
+use super::pieces::independent;
 use crate::candidates::{Candidate, library};
 
 /// One effect at its best shape.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub change: Change,
-    /// Log evidence over no change.
+    /// Log evidence over no change, by the number of independent pieces.
     pub log: f64,
     /// Its parameters of either kind: name, unit, value, standard deviation; amplitudes first.
     pub parameters: Vec<(&'static str, &'static str, f64, f64)>,
@@ -52,10 +53,10 @@ pub(super) struct Weighed {
     pub alone: Vec<Fit>,
 }
 
-/// The laws of an effect: each amplitude alone where they are alternatives, otherwise all together.
+/// The laws of an effect: all amplitudes together, and each alone where they are alternatives.
 fn laws(candidate: &Candidate) -> Vec<Option<usize>> {
-    let amplitudes = candidate.signs().len();
-    if candidate.info.alternatives { (0..amplitudes).map(Some).collect() } else { vec![None] }
+    let alone = if candidate.info.alternatives { candidate.signs().len() } else { 0 };
+    (0..alone).map(Some).chain([None]).collect()
 }
 
 /// The columns of an effect at one set of shapes, N per unit of each amplitude.
@@ -138,11 +139,8 @@ fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fi
         let law = |shapes: &Vec<f64>| {
             fit(cells, metric, candidate, (best.law, shapes), &columns(cells, candidate, shapes))
         };
-        let better = near
-            .iter()
-            .filter_map(law)
-            .max_by(|a, b| a.log.total_cmp(&b.log))
-            .filter(|f| f.log > best.log);
+        let better =
+            near.iter().filter_map(law).max_by(|a, b| a.log.total_cmp(&b.log)).filter(|f| f.log > best.log);
         match better {
             Some(f) => best = f,
             None => step /= 2.0,
@@ -152,17 +150,30 @@ fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fi
     Some((best, mean - coarse))
 }
 
-/// The evidence of a law over no change where its error is a share of its own trace.
+/// A law with each size of its own error: the best of these fits, and the log evidence of each over no change.
+struct Inexact {
+    fit: Fit,
+    logs: Vec<f64>,
+}
+
+/// A law where its error is a share of its own trace. `base`: log density of no change, less what the choice of a shape costs.
 fn with_own_error(
     cells: &Cells,
     usual: &[DVector<f64>],
     candidate: &Candidate,
     (found, least): (Fit, &[f64]),
-) -> Fit {
-    let metric = Metric::of(cells, usual, &with_error(&cells.group, &found.trace, least));
+    base: f64,
+) -> Inexact {
     let columns = columns(cells, candidate, &found.shapes);
-    let Some(own) = fit(cells, &metric, candidate, (found.law, &found.shapes), &columns) else { return found };
-    Fit { log: own.log + metric.density, ..own }
+    let at = |share: &f64| {
+        let metric = Metric::of(cells, usual, &with_error(&cells.group, &found.trace, least, *share));
+        let own = fit(cells, &metric, candidate, (found.law, &found.shapes), &columns)?;
+        Some(Fit { log: own.log + metric.density - base, ..own })
+    };
+    let fits: Vec<Fit> = CATALOGUE_LAW_ERRORS.iter().filter_map(at).filter(|f| f.log.is_finite()).collect();
+    let logs = fits.iter().map(|f| f.log).collect();
+    let best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log));
+    Inexact { fit: best.unwrap_or(found), logs }
 }
 
 /// For each law, those that these cells do not tell from it.
@@ -192,20 +203,25 @@ impl Round {
         let metric = Metric::of(cells, &columns, &beyond(CATALOGUE_LAW_ERROR * size));
         let one = |candidate: &Candidate| {
             let (found, occam) = scan(cells, &metric, candidate)?;
-            let own = with_own_error(cells, &columns, candidate, (found, least));
-            Some(Fit { log: own.log + occam - still.density, ..own })
+            Some(with_own_error(cells, &columns, candidate, (found, least), still.density - occam))
         };
-        let mut fits: Vec<Fit> = candidates.par_iter().filter_map(one).collect();
+        let found: Vec<Inexact> =
+            candidates.par_iter().filter_map(one).filter(|l| !l.logs.is_empty()).collect();
+        // States differ from a law together, not one by one.
+        let best = found.iter().max_by(|a, b| log_mean(&a.logs).total_cmp(&log_mean(&b.logs)));
+        let left = best.map_or_else(|| cells.difference.clone(), |b| &cells.difference - &b.fit.trace);
+        let pieces = independent(cells, &metric.without_usual(&left)).min(CATALOGUE_INDEPENDENT);
+        let factor = (cells.groups as f64 / pieces).max(1.0);
+        let tempered = |logs: &[f64]| log_mean(&logs.iter().map(|l| l / factor).collect::<Vec<f64>>());
+        let mut fits: Vec<Fit> = found.into_iter().map(|l| Fit { log: tempered(&l.logs), ..l.fit }).collect();
         fits.sort_by(|a, b| b.log.total_cmp(&a.log).then(a.change.cmp(&b.change)));
         let free =
             SIZES.map(|s| Metric::of(cells, &columns, &beyond(s * cells.largest)).density - still.density);
-        let unknown = log_mean(&free);
-        // States differ from a law together, not one by one.
-        let factor = (cells.groups as f64 / CATALOGUE_INDEPENDENT).max(1.0);
+        let unknown = tempered(&free);
         let share = (1.0 - none - PRIOR_UNKNOWN).max(1e-3) / fits.len().max(1) as f64;
-        let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown / factor]
+        let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown]
             .into_iter()
-            .chain(fits.iter().map(|f| share.ln() + f.log / factor))
+            .chain(fits.iter().map(|f| share.ln() + f.log))
             .collect();
         let total = log_sum(&logs);
         let p: Vec<f64> = logs.iter().map(|l| (l - total).exp()).collect();
@@ -268,7 +284,7 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
         }
         taken.extend(next.fit.columns.iter().cloned());
         // What a law leaves of what it explains, no law describes.
-        least = with_error(&cells.group, &next.fit.trace, &least);
+        least = with_error(&cells.group, &next.fit.trace, &least, CATALOGUE_LAW_ERROR);
         accepted.push(next);
         round = Round::of(cells, &candidates, &taken, none, &least);
     }
