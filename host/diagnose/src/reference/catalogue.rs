@@ -11,6 +11,7 @@ mod cells;
 mod metric;
 mod pieces;
 mod rests;
+mod taper;
 mod weigh;
 
 use super::answer::ChangeReport;

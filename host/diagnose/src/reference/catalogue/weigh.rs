@@ -1,5 +1,6 @@
 //! How strongly the cells support each effect of the catalogue as the change.
 
+use model_core::effects::Role;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -12,6 +13,7 @@ use super::super::shapes::{Change, Class};
 use super::cells::Cells;
 use super::metric::{Metric, is_same, usual, with_error};
 use super::pieces::independent;
+use super::taper;
 use crate::candidates::{Candidate, library};
 
 /// One effect at its best shape.
@@ -55,13 +57,21 @@ pub(super) struct Weighed {
 
 /// The laws of an effect: all amplitudes together, and each alone where they are alternatives.
 fn laws(candidate: &Candidate) -> Vec<Option<usize>> {
-    let alone = if candidate.info.alternatives { candidate.signs().len() } else { 0 };
+    let alone = if candidate.info.alternatives { amplitudes(candidate).len() } else { 0 };
     (0..alone).map(Some).chain([None]).collect()
+}
+
+/// Name and unit of each amplitude of an effect.
+fn amplitudes(candidate: &Candidate) -> Vec<(&'static str, &'static str)> {
+    let own = candidate.info.parameters.iter().filter(|p| matches!(p.role, Role::Amplitude));
+    own.map(|p| (p.name, p.unit)).chain(taper::belongs(candidate).then_some(taper::PARAMETER)).collect()
 }
 
 /// The columns of an effect at one set of shapes, N per unit of each amplitude.
 fn columns(cells: &Cells, candidate: &Candidate, shapes: &[f64]) -> Vec<DVector<f64>> {
-    candidate.columns(shapes, &cells.rows).iter().map(|c| cells.means(c)).collect()
+    let mut columns = candidate.columns(shapes, &cells.rows);
+    columns.extend(taper::belongs(candidate).then(|| taper::column(&cells.rows)));
+    columns.iter().map(|c| cells.means(c)).collect()
 }
 
 /// One law of an effect at one set of shapes; `None` where the cells do not show it.
@@ -106,14 +116,13 @@ fn fit(
     }
     let trace = &u * &mean;
     let mut parameters: Vec<_> = Vec::new();
-    let amplitudes =
-        candidate.info.parameters.iter().filter(|p| matches!(p.role, model_core::effects::Role::Amplitude));
-    for (i, p) in amplitudes.enumerate().filter(|(i, _)| law.is_none_or(|l| l == *i)) {
+    let named = amplitudes(candidate).into_iter().enumerate();
+    for (i, (name, unit)) in named.filter(|(i, _)| law.is_none_or(|l| l == *i)) {
         let (value, std) = live
             .iter()
             .position(|l| *l == i)
             .map_or((0.0, 0.0), |j| (mean[j] / rms[i], covariance[(j, j)].max(0.0).sqrt() / rms[i]));
-        parameters.push((p.name, p.unit, value, std));
+        parameters.push((name, unit, value, std));
     }
     parameters.extend(candidate.shapes().zip(shapes).map(|(p, s)| (p.name, p.unit, *s, 0.0)));
     let change = Change::from_name(candidate.name())?;
