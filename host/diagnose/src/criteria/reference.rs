@@ -242,8 +242,8 @@ pam_data::criteria! {
     /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
     CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
     /// How inexact the law of an effect may be, share of its trace in each state, each as likely as the others beforehand: from a law that is
-    /// nearly exact to one that is a trend only.
-    CATALOGUE_LAW_ERRORS: ([f64; 4]) = [0.05, 0.1, 0.2, 0.4], "catalogue_law_errors", "1", Judgement;
+    /// nearly exact to one that is good to a fifth. A difference that no law describes better has no name.
+    CATALOGUE_LAW_ERRORS: ([f64; 3]) = [0.05, 0.1, 0.2], "catalogue_law_errors", "1", Judgement;
     /// How inexact it usually is. Laws whose traces differ by less are not distinguished.
     CATALOGUE_LAW_ERROR: f64 = 0.15, "catalogue_law_error", "1", Judgement;
     /// Correlation of neighbouring states that is believed at most.
