@@ -55,10 +55,12 @@ pub(super) struct Weighed {
     pub alone: Vec<Fit>,
 }
 
-/// The laws of an effect: all amplitudes together, and each alone where they are alternatives.
+/// The laws of an effect: each amplitude alone where they are alternatives, otherwise all together. What the tapers enclose less and what the
+/// slant of their fibres costs are parts of one law.
 fn laws(candidate: &Candidate) -> Vec<Option<usize>> {
     let alone = if candidate.info.alternatives { amplitudes(candidate).len() } else { 0 };
-    (0..alone).map(Some).chain([None]).collect()
+    let together = alone == 0 || taper::belongs(candidate);
+    (0..alone).map(Some).chain(together.then_some(None)).collect()
 }
 
 /// Name and unit of each amplitude of an effect.
@@ -216,10 +218,12 @@ impl Round {
         };
         let found: Vec<Inexact> =
             candidates.par_iter().filter_map(one).filter(|l| !l.logs.is_empty()).collect();
-        // States differ from a law together, not one by one.
+        // States differ from a law together, not one by one; each pressure was recorded by itself.
         let best = found.iter().max_by(|a, b| log_mean(&a.logs).total_cmp(&log_mean(&b.logs)));
         let left = best.map_or_else(|| cells.difference.clone(), |b| &cells.difference - &b.fit.trace);
-        let pieces = independent(cells, &metric.without_usual(&left)).min(CATALOGUE_INDEPENDENT);
+        let pieces = independent(cells, &metric.without_usual(&left))
+            .max(cells.levels.len() as f64)
+            .min(CATALOGUE_INDEPENDENT);
         let factor = (cells.groups as f64 / pieces).max(1.0);
         let tempered = |logs: &[f64]| log_mean(&logs.iter().map(|l| l / factor).collect::<Vec<f64>>());
         let mut fits: Vec<Fit> = found.into_iter().map(|l| Fit { log: tempered(&l.logs), ..l.fit }).collect();
