@@ -218,7 +218,7 @@ impl Round {
         };
         let found: Vec<Inexact> =
             candidates.par_iter().filter_map(one).filter(|l| !l.logs.is_empty()).collect();
-        // States differ from a law together, not one by one; each pressure was recorded by itself.
+        // States differ from a law together, not one by one; each pressure was recorded alone.
         let best = found.iter().max_by(|a, b| log_mean(&a.logs).total_cmp(&log_mean(&b.logs)));
         let left = best.map_or_else(|| cells.difference.clone(), |b| &cells.difference - &b.fit.trace);
         let pieces = independent(cells, &metric.without_usual(&left))
