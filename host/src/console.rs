@@ -109,7 +109,7 @@ impl Console {
     /// A result, on standard output. A reader that stopped reading (`| head`) is no failure; any other failure is reported by
     /// [`unprinted`] when the command has ended.
     pub fn result(&self, text: impl Display) {
-        if let Err(error) = print(format!("{}\n", printable(&text.to_string())).as_bytes()) {
+        if let Err(error) = print(format!("{}\n", said(text)).as_bytes()) {
             UNPRINTED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }
     }

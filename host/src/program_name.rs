@@ -1,5 +1,5 @@
-//! The two names of the program: `host`, and `pam` where a system has another `host`. Help, completions and manual pages use the name
-//! that was called, and so do messages.
+//! The two names of the program: `host`, and `pam` where a system has another `host`. Help, completions, manual pages, messages, results
+//! and pages use the name that was called.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -45,6 +45,18 @@ pub(crate) fn in_called_name(text: String) -> String {
     if name == WRITTEN { text } else { in_text(&text, name) }
 }
 
+/// A page in HTML, with the called name in its commands.
+#[must_use]
+pub(crate) fn in_page(html: String) -> String {
+    let name = called();
+    if name == WRITTEN { html } else { in_code(&html, name) }
+}
+
+/// `html` with the program called `name` where its name begins a piece of code.
+fn in_code(html: &str, name: &str) -> String {
+    html.replace(&format!("<code>{WRITTEN} "), &format!("<code>{name} "))
+}
+
 /// `text` with the program called `name` where it stands as a command: at the start of a line or of a shell command, or in backquotes.
 fn in_text(text: &str, name: &str) -> String {
     let mut renamed = String::with_capacity(text.len());
@@ -81,5 +93,10 @@ mod tests {
         let text = "Examples:\n  host fit a.csv && host flash b\n  host man | man -l -   # then: host-fit\nthe host program, `host vent`";
         let said = "Examples:\n  pam fit a.csv && pam flash b\n  pam man | man -l -   # then: pam-fit\nthe host program, `pam vent`";
         assert_eq!(in_text(text, "pam"), said);
+    }
+    #[test]
+    fn only_commands_of_a_page_take_the_called_name() {
+        let page = "<td>host 7</td><p>the host, <code>host fit a.csv</code></p>";
+        assert_eq!(in_code(page, "pam"), "<td>host 7</td><p>the host, <code>pam fit a.csv</code></p>");
     }
 }

@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::Command;
 
 use clap::CommandFactory;
+use model_core::muscle::Muscle;
+use model_core::units::{Length, Pressure};
 
 fn host(folder: &Path, arguments: &[&str], port: Option<&str>) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
@@ -267,4 +269,23 @@ fn the_second_name_is_the_same_program() {
         Command::new(env!("CARGO_BIN_EXE_pam")).args(["table", "check", "none.pam"]).output().unwrap();
     let text = String::from_utf8(missing.stderr).unwrap();
     assert!(text.contains("`pam fit`") && !text.contains("`host"), "{text}");
+    // The advice on pages does, too.
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let muscle = Muscle::<f64>::build(&model_core::table::example()).unwrap();
+    let mut rows = "time_s,pressure_kPa,displacement_mm,force_N\n".to_owned();
+    for (i, kpa) in [200.0, 300.0, 400.0].into_iter().enumerate() {
+        for j in 0..60 {
+            let (mm, direction) = if j < 30 { (j, 1.0) } else { (60 - j, -1.0) };
+            let mm = 0.08 * f64::from(mm);
+            let force =
+                muscle.force(Pressure::from_pascals(1e3 * kpa), Length::from_metres(1e-3 * mm), direction);
+            rows += &format!("{},{kpa},{mm},{}\n", 60 * i as i32 + j, force.newtons());
+        }
+    }
+    std::fs::write(at("a.csv"), rows).unwrap();
+    std::fs::write(at("m.toml"), include_str!("../../examples/muscles/mini.toml")).unwrap();
+    said(&["fit", "--muscle", &at("m.toml"), &at("a.csv"), "-o", &at("m.pam"), "--report", &at("r.html")]);
+    let html = std::fs::read_to_string(at("r.html")).unwrap();
+    assert!(html.contains("<code>pam predict") && !html.contains("<code>host"), "{html}");
 }

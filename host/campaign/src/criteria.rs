@@ -17,6 +17,8 @@ pub const SLOW_STROKE: f64 = 27.0;
 /// Pressure rate of the first ramp at rest length, share of the highest level per second: it shows deadband and blocked force, and takes
 /// 5 s each way.
 pub const FIRST_RAMP_SHARE: f64 = 0.2;
+/// The first tare, s: the mean of 50 readings has a seventh of their noise, and later tares improve it.
+pub const FIRST_TARE: f64 = 5.0;
 /// Speed of the survey of all levels, in slow speeds: a stroke of some seconds, slow against regulators of some hundredths of a second.
 pub const SURVEY_SPEED: f64 = 8.0;
 /// Share of the blocked force below which the muscle counts as free; a stroke turns there.
@@ -26,6 +28,11 @@ pub const FREE_FORCE: f64 = 0.01;
 pub const LARGEST_CONTRACTION: f64 = 0.4;
 /// Pressure rate while nothing is recorded, share of the highest level per second.
 pub const RAMP_SHARE: f64 = 0.2;
+/// Pressure rate between the levels of the survey, share of the highest level per second, and the rest at each level, s: a tenth of a
+/// second's lag and its decay are over by then, and creep matters less than time before there is a table.
+pub const SURVEY_RAMP_SHARE: f64 = 0.4;
+/// See [`SURVEY_RAMP_SHARE`].
+pub const SURVEY_HOLD: f64 = 1.0;
 /// Pressure rate of a recorded ramp, share of the highest level per second: slow against every regulator.
 pub const SLOW_RAMP_SHARE: f64 = 0.04;
 /// Samples per second of bench time.

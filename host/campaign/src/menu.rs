@@ -1,6 +1,6 @@
 //! Which steps a rig can do, and the first ones of every campaign.
 
-use crate::criteria::SURVEY_SPEED;
+use crate::criteria::{FIRST_TARE, SURVEY_SPEED};
 use crate::places::Places;
 use crate::rig::{Axis, Rig};
 use crate::step::{CheckKind, Step};
@@ -43,7 +43,7 @@ pub fn menu(places: &Places, rig: &Rig) -> Vec<Step> {
 #[must_use]
 pub fn opening(rig: &Rig) -> Vec<(Step, &'static str)> {
     let mut steps = vec![
-        (Step::Tare { seconds: 10.0 }, "The zeros of the instruments are needed before anything else."),
+        (Step::Tare { seconds: FIRST_TARE }, "The zeros of the instruments are needed before anything else."),
         (
             Step::BlockedRamp,
             "It shows the deadband and the blocked force, from which the pressure levels follow.",

@@ -4,7 +4,9 @@ use model_core::effects::BenchCheck;
 use serde::{Deserialize, Serialize};
 
 use crate::course::{Course, Segment, VENT_S};
-use crate::criteria::{FIRST_RAMP_SHARE, HANDLING_S, RAMP_SHARE, SLOW_RAMP_SHARE};
+use crate::criteria::{
+    FIRST_RAMP_SHARE, HANDLING_S, RAMP_SHARE, SLOW_RAMP_SHARE, SURVEY_HOLD, SURVEY_RAMP_SHARE,
+};
 use crate::places::Places;
 
 /// What a step does.
@@ -206,7 +208,7 @@ impl Step {
             Self::BlockedRamp => builder.blocked_ramp(),
             Self::Survey { times } => {
                 for level in places.levels().into_iter().rev() {
-                    builder.begin(level);
+                    builder.set(level, SURVEY_RAMP_SHARE, SURVEY_HOLD);
                     builder.loops(times, 1);
                 }
             }
@@ -272,9 +274,14 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn begin(&mut self, level: f64) {
+        self.set(level, RAMP_SHARE, 2.0);
+    }
+
+    /// Goes to a level at a rate, share of the highest level per second, and waits there, s.
+    fn set(&mut self, level: f64, rate: f64, seconds: f64) {
         self.level = level;
-        self.course.skip(Segment::Ramp { to: level, rate: RAMP_SHARE * self.places.top });
-        self.course.skip(Segment::Hold { seconds: 2.0 });
+        self.course.skip(Segment::Ramp { to: level, rate: rate * self.places.top });
+        self.course.skip(Segment::Hold { seconds });
     }
 
     fn end(&mut self) {

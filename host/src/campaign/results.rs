@@ -15,6 +15,7 @@ use pam_fit::table_file::{self, About, TableFile};
 use pam_report::{diagnose_page, fit_page};
 
 use crate::documents::campaign as document;
+use crate::program_name::in_page;
 
 /// The table of everything recorded, with the effects that the diagnosis named where they help; written into the folder.
 pub(crate) fn table(engine: &Engine, folder: &Path) -> Result<Option<TableFile>> {
@@ -49,11 +50,11 @@ pub(crate) fn pages(engine: &Engine, folder: &Path) -> Result<()> {
     let campaign = Campaign::new(engine.recordings().to_vec());
     if let Some(findings) = engine.findings() {
         let page = fit_page::page(&findings.fit, &campaign, &pam_fit::Options::default());
-        write_whole(&folder.join("fit.html"), page.html().as_bytes())?;
+        write_whole(&folder.join("fit.html"), in_page(page.html()).as_bytes())?;
     }
     if let Some(diagnosis) = engine.diagnosis() {
         let page = diagnose_page::page(diagnosis, &engine.muscle().geometry(), &campaign);
-        write_whole(&folder.join("diagnosis.html"), page.html().as_bytes())?;
+        write_whole(&folder.join("diagnosis.html"), in_page(page.html()).as_bytes())?;
     }
     Ok(())
 }

@@ -15,6 +15,7 @@ use crate::campaign::rigging::{Rigging, emulated, real, tracked};
 use crate::campaign::watching::Watching;
 use crate::console::Console;
 use crate::documents::text;
+use crate::program_name::in_page;
 use pam_campaign::campaign::{Done, Outcome, run};
 use pam_campaign::engine::{Engine, Purpose};
 use pam_campaign::journal::Journal;
@@ -176,7 +177,7 @@ impl Arguments {
         let json = text(&document)?;
         write_whole(&self.output.join("campaign.json"), format!("{json}\n").as_bytes())?;
         let report = self.output.join("report.html");
-        write_whole(&report, page(engine, course, &document).html().as_bytes())?;
+        write_whole(&report, in_page(page(engine, course, &document).html()).as_bytes())?;
         if let (Some(before), true) = (&self.reference, told.complete) {
             self.changed(engine, before, console)?;
         }

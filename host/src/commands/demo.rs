@@ -15,6 +15,7 @@ use crate::demo::page::{Story, page, rms};
 use crate::demo::tracking::{Law, Task, Track, choose, track};
 use crate::documents::recording::Run;
 use crate::documents::{bench, text};
+use crate::program_name::in_page;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
@@ -130,7 +131,7 @@ impl Arguments {
             seconds: began.elapsed().as_secs_f64(),
         };
         let report = self.output.join("demo.html");
-        write_whole(&report, page(&story)?.html().as_bytes())?;
+        write_whole(&report, in_page(page(&story)?.html()).as_bytes())?;
         let figures = figures(&story);
         write_whole(&self.output.join("demo.json"), (text(&figures)? + "\n").as_bytes())?;
         if self.json {

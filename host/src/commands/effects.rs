@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::console::Console;
 use crate::documents::{effects as document, text};
+use crate::program_name::in_page;
 use clap::Args;
 use pam_data::error::{DataCode, Error, Result, nearest};
 use pam_data::output::{printed, to_standard_output, write_whole};
@@ -65,7 +66,7 @@ impl Arguments {
         if let Some(path) = &self.report {
             let all = catalogue()?;
             if let Some((trace, figure)) = all.iter().find(|(t, _)| t.candidate == candidate) {
-                write_whole(path, effect_page::page(trace, figure, &all).html().as_bytes())?;
+                write_whole(path, in_page(effect_page::page(trace, figure, &all).html()).as_bytes())?;
                 console.note(format!("wrote {}", path.display()));
             }
         }

@@ -11,7 +11,7 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::pluralise::pluralise;
-use pam_data::recording::import_guess::{Guess, guess};
+use pam_data::recording::import_guess::{Guess, guess_among};
 use pam_data::recording::{Import, Quantity, Reader, Recording};
 use pam_data::short_number::short;
 
@@ -55,7 +55,7 @@ impl Arguments {
     /// # Errors
     /// A file that cannot be read or is not a table; one that the description does not suffice for.
     pub fn run(self, console: &Console) -> Result<()> {
-        let Some(first) = self.guess.first() else { return Ok(()) };
+        let Some((first, others)) = self.guess.split_first() else { return Ok(()) };
         if let Some(path) =
             self.output.as_deref().filter(|p| !self.replace && p.as_os_str() != "-" && p.exists())
         {
@@ -65,7 +65,7 @@ impl Arguments {
         }
         let muscle = self.muscle.as_ref().map(MuscleDescription::read).transpose()?;
         let usual = guess_needed(first, muscle.as_ref());
-        let guessed = guess(first, self.sheet.as_deref())?;
+        let guessed = guess_among(first, others, self.sheet.as_deref())?;
         let import = Import::parse(&guessed.description)?;
         let tried: Vec<Result<Vec<Recording>>> =
             self.guess.iter().map(|f| tried(f, &import, &guessed, muscle.as_ref())).collect();
@@ -177,7 +177,9 @@ fn to_text(guess: &Guess, recordings: &[&Recording], usual: bool) -> String {
             lines.iter().for_each(|line| text += &format!("  - {line}\n"));
         }
     }
-    if usual && guess.split_by.is_empty() {
+    if usual && !guess.only_names() {
+        text += "this file is read without an import description, too, but not with these signs, zeros and runs\n";
+    } else if usual {
         text += "this file is read without an import description\n";
     }
     text.trim_end().to_owned()
@@ -234,7 +236,7 @@ fn to_document(guess: &Guess, recordings: &[&Recording], usual: bool) -> documen
     document::Import {
         schema: "pam-import/1",
         file: guess.file.clone(),
-        usual,
+        usual: usual && guess.only_names(),
         rows: guess.rows,
         columns: columns.collect(),
         split_by: guess.split_by.clone(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::console::Console;
-use crate::program_name;
+use crate::program_name::{self, in_page};
 use pam_data::error::Result;
 use pam_data::output::write_whole;
 use pam_data::pluralise::pluralise;
@@ -47,7 +47,7 @@ impl Reports {
         let mut page = page();
         page.provenance(from);
         if let Some(path) = &self.report {
-            write_whole(path, page.html().as_bytes())?;
+            write_whole(path, in_page(page.html()).as_bytes())?;
             console.detail(format!("report in {}", path.display()));
         }
         if let Some(folder) = &self.figures {

@@ -11,7 +11,7 @@ use serde::Serialize;
 pub(crate) struct Import {
     pub schema: &'static str,
     pub file: String,
-    /// Whether the file is read without a description.
+    /// Whether the file is read without a description, with the same signs, zeros and runs.
     pub usual: bool,
     pub rows: usize,
     pub columns: Vec<Column>,

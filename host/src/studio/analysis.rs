@@ -14,6 +14,7 @@ use crate::change_watch::Reference;
 use crate::console::Console;
 use crate::demo::campaign::record;
 use crate::documents::bench::Compare;
+use crate::program_name::in_page;
 use pam_data::compare::compare;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
@@ -277,7 +278,7 @@ impl Analysis {
         let path = self.free("fitted", "pam");
         table.write(&path)?;
         let lines = lines(&campaign, &fitted.table)?;
-        let html = fit_page::page(&fitted, &campaign, &options).html();
+        let html = in_page(fit_page::page(&fitted, &campaign, &options).html());
         let name = report_name()?;
         let mut known = self.known();
         known.table = Some(path.clone());
@@ -299,7 +300,7 @@ impl Analysis {
             &geometry,
             &pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
         )?;
-        let html = diagnose_page::page(&answer, &geometry, &campaign).html();
+        let html = in_page(diagnose_page::page(&answer, &geometry, &campaign).html());
         let report = Self::keep_report(&mut self.known(), report_name()?, html);
         Ok(Diagnosed { text: pam_report::wording::summary(&answer), report })
     }

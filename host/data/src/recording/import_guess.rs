@@ -20,19 +20,23 @@
 mod absolute;
 mod layout;
 mod lookup;
+mod named_length;
 mod names;
+mod others;
 mod roles;
 mod runs;
 mod sample;
+mod stroke;
 mod text;
 mod time;
 mod values;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::quantity::Quantity;
 use crate::error::Result;
 use lookup::Listed;
+use others::Others;
 use sample::Sample;
 
 /// Where a column of a description is.
@@ -118,6 +122,17 @@ impl Guess {
         self.lookup.as_ref().map(|l| l.file.as_str())
     }
 
+    /// Whether the description says no more than names and units: signs, zeros, offsets, runs and constants are as they are without it.
+    #[must_use]
+    pub fn only_names(&self) -> bool {
+        let plain = |c: &GuessedColumn| {
+            let scaled = c.scale != 1.0 || c.offset != 0.0;
+            !(scaled || c.extension || c.from_longest || !c.values.is_empty())
+        };
+        let whole = self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
+        whole && self.lookup.is_none() && self.columns.iter().all(plain)
+    }
+
     /// Whether a quantity was found.
     #[must_use]
     pub fn has(&self, quantity: Quantity) -> bool {
@@ -135,8 +150,17 @@ pub(super) fn is_reading_of(name: &str, quantity: Quantity) -> bool {
 /// # Errors
 /// A file that cannot be read, or that holds no table.
 pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
+    guess_among(path, &[], sheet)
+}
+
+/// Looks at a file and describes it. Other files of the same bench show whether a length was held in each of them,
+/// and their names may say which one.
+///
+/// # Errors
+/// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
+pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let mut guess = roles::assign(path, &sample);
+    let mut guess = roles::assign(path, &sample, &Others { files: others, sheet });
     guess.description = text::description(&guess);
     Ok(guess)
 }

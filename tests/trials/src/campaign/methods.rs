@@ -243,6 +243,9 @@ fn written(folder: &Path, name: &str, csv: &str) -> Result<PathBuf, String> {
     Ok(path)
 }
 
+/// Rows that a recording must have more than, to be used.
+pub const LEAST_ROWS: usize = 20;
+
 /// What the bench recorded until a time, s.
 pub fn until<'a>(files: impl Iterator<Item = (&'a str, &'a [Row])>, seconds: f64) -> Vec<Recording> {
     let reading = |r: &Row| Reading {
@@ -258,6 +261,6 @@ pub fn until<'a>(files: impl Iterator<Item = (&'a str, &'a [Row])>, seconds: f64
             let kept: Vec<Reading> = rows.iter().filter(|r| r.time <= seconds).map(reading).collect();
             recording(name, &kept)
         })
-        .filter(|r| r.len() > 20)
+        .filter(|r| r.len() > LEAST_ROWS)
         .collect()
 }

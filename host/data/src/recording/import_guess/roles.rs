@@ -4,17 +4,14 @@ use std::path::Path;
 
 use super::lookup;
 use super::names::{Family, Name, Score};
+use super::others::Others;
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, Source, absolute, runs, time, values};
+use super::{Guess, GuessedColumn, Source, absolute, named_length, runs, stroke, time, values};
 use crate::recording::Quantity;
 use crate::short_number::short;
 
-/// A correlation of force with displacement at equal pressure from which the sign of the displacement is taken as shown. Uncorrelated
-/// readings of two independent slow movements rarely reach 0.8, and a force that falls with the stroke exceeds it.
-const SHOWN: f64 = 0.8;
-
 /// Decides on every column.
-pub(super) fn assign(path: &Path, sample: &Sample) -> Guess {
+pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess {
     let mut guess = Guess {
         file: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         rows: sample.rows,
@@ -58,7 +55,8 @@ pub(super) fn assign(path: &Path, sample: &Sample) -> Guess {
     time::find(sample, &mut used, &mut guess);
     find_pressure(sample, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
-    judge_stroke(sample, &mut guess);
+    named_length::find(others, &mut guess);
+    stroke::judge(sample, others, &mut guess);
     absolute::ask(sample, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
     guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
@@ -339,71 +337,22 @@ fn list(words: &[String]) -> String {
     format!("{}{more}", words.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", "))
 }
 
-/// The sign and the zero of a displacement, by its name and by the force.
-fn judge_stroke(sample: &Sample, guess: &mut Guess) {
-    let values = |q: Quantity| {
-        let column = guess.columns.iter().find(|c| c.quantity == q)?;
-        let n = (0..sample.columns.len()).find(|n| source(sample, *n) == column.source)?;
-        Some((column.scale.signum(), &sample.columns[n].numbers))
-    };
-    let Some((_, stroke)) = values(Quantity::Displacement) else { return };
-    let force: Option<Vec<f64>> =
-        values(Quantity::Force).map(|(sign, force)| force.iter().map(|f| sign * f).collect());
-    // An uncalibrated reading shows the sign as well, where nothing better is there.
-    let raw = || {
-        let is_force = |c: &&SampleColumn| {
-            c.is_numeric() && c.name.quantity().is_some_and(|(q, _)| q == Quantity::Force)
-        };
-        sample.columns.iter().find(is_force).map(|c| c.numbers.clone())
-    };
-    let force = force.or_else(raw);
-    let pressure = values(Quantity::Pressure).map(|(_, p)| p.as_slice());
-    let shown = force.and_then(|f| values::force_against(stroke, &f, pressure));
-    let Some(column) = guess.columns.iter_mut().find(|c| c.quantity == Quantity::Displacement) else {
-        return;
-    };
-    let header = column.header.clone();
-    match shown {
-        Some(r) if r > SHOWN && !column.extension => {
-            column.extension = true;
-            guess.checks.push(format!(
-                "the force rises with {header} at equal pressure: it is taken to grow as the muscle gets longer"
-            ));
-        }
-        Some(r) if r < -SHOWN && column.extension => {
-            column.extension = false;
-            guess.checks.push(format!(
-                "the force falls with {header} at equal pressure: it is taken to grow as the muscle shortens, despite its name"
-            ));
-        }
-        _ => {}
-    }
-    if let Some((low, high)) = column.range {
-        let longest = if column.extension { high } else { low };
-        // A zero within a third of the stroke may be meant; one farther away is that of the machine.
-        if !(longest.abs() <= (high - low) / 3.0) {
-            column.from_longest = true;
-            guess.checks.push(format!(
-                "{header} has a zero of its own: the stroke is counted from the greatest length in each file, which must be the rest length"
-            ));
-        }
-    }
-}
-
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
     if !guess.has(Quantity::Time) && !guess.unknown.iter().any(|u| u.contains("times of day")) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
         guess.unknown.insert(0, text.to_owned());
     }
-    if !guess.has(Quantity::Pressure) && guess.patterns.is_empty() {
+    let caught =
+        |guess: &Guess, name: &str| guess.patterns.iter().any(|(_, p)| p.contains(&format!("<{name}_")));
+    if !guess.has(Quantity::Pressure) && !caught(guess, "pressure") {
         let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants]";
         guess.unknown.push(text.to_owned());
     }
     let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
-    if !stroke.iter().any(|q| guess.has(*q)) {
+    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, q.name())) {
         let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
-                    under [constants]";
+                    under [constants], or give the files of all lengths, whose names say it";
         guess.unknown.push(text.to_owned());
     }
     if !guess.has(Quantity::Force) {

@@ -1,8 +1,11 @@
-//! Where one run of a file ends and the next begins: time begins again, and columns of labels change there.
+//! Where one run of a file ends and the next begins: time begins again, and columns of labels change there; or a column numbers them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::sample::{Levels, SampleColumn};
+
+/// Rows of a run at least, on average: what changes more often is a reading.
+const LEAST_ROWS: usize = 10;
 
 /// The columns, by their index, whose values set the runs of a file apart, none where time increases throughout; and how often time
 /// does not increase within the runs.
@@ -35,8 +38,25 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
             _ => break,
         }
     }
+    if chosen.is_empty() && left == 0 {
+        chosen = numbered(columns);
+    }
     chosen.sort_unstable();
     (chosen, left)
+}
+
+/// Columns called run, mounting or so that number the runs of a file whose clock continues: together they never come back to an earlier
+/// value. Joined into one recording, runs at different held lengths would look like motion.
+fn numbered(columns: &[SampleColumn]) -> Vec<usize> {
+    let named =
+        |c: &SampleColumn| c.name.sets_apart() && c.levels.as_ref().is_some_and(|l| l.words.len() > 1);
+    let found: Vec<usize> = (0..columns.len()).filter(|n| named(&columns[*n])).collect();
+    let levels: Vec<&Levels> = found.iter().filter_map(|n| columns[*n].levels.as_ref()).collect();
+    let rows = levels.first().map_or(0, |l| l.codes.len());
+    let key = |row: usize| -> Vec<u32> { levels.iter().map(|l| l.codes[row]).collect() };
+    let stretches = (1..rows).filter(|row| key(*row) != key(row - 1)).count() + 1;
+    let different = (0..rows).map(key).collect::<HashSet<_>>().len();
+    if stretches == different && rows >= LEAST_ROWS * stretches { found } else { Vec::new() }
 }
 
 /// Rows whose time is not later than that of the row before them in the same group.

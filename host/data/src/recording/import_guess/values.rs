@@ -110,6 +110,15 @@ pub(super) fn force_against(stroke: &[f64], force: &[f64], pressure: Option<&[f6
     partial.is_finite().then_some(partial)
 }
 
+/// Correlation of pressure with displacement where the pressure varies on purpose: positive where the displacement shortens the muscle.
+pub(super) fn pressure_against(stroke: &[f64], pressure: &[f64]) -> Option<f64> {
+    /// A regulator's droop is less than this share of the highest pressure.
+    const VARIED: f64 = 0.5;
+    let finite = || pressure.iter().copied().filter(|p| p.is_finite());
+    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    (high - low > VARIED * low.abs().max(high.abs())).then(|| correlation(pressure, stroke))?
+}
+
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let both = || a.iter().zip(b).filter(|(x, y)| x.is_finite() && y.is_finite());
     let n = both().count() as f64;

@@ -1,0 +1,104 @@
+//! The sign and the zero of a displacement, by its name, by force and pressure, and by what other files of the bench hold.
+
+use super::others::Others;
+use super::sample::{Sample, SampleColumn};
+use super::{Guess, GuessedColumn, roles, values};
+use crate::recording::Quantity;
+use crate::short_number::short;
+
+/// A correlation of force with displacement at equal pressure from which the sign of the displacement is taken as shown. Uncorrelated
+/// readings of two independent slow movements rarely reach 0.8, and a force that falls with the stroke exceeds it.
+const SHOWN: f64 = 0.8;
+/// A displacement that varies by less than this share of itself is held: a frame yields by so much, and no stroke is so short.
+const HELD: f64 = 0.01;
+
+/// Decides on the displacement.
+pub(super) fn judge(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
+    sign(sample, guess);
+    let is_stroke = |c: &&mut GuessedColumn| c.quantity == Quantity::Displacement;
+    let Some(column) = guess.columns.iter_mut().find(is_stroke) else { return };
+    let Some((low, high)) = column.range else { return };
+    let header = column.header.clone();
+    let longest = if column.extension { high } else { low };
+    // A zero within a third of the stroke may be meant; one farther away is that of the machine.
+    if longest.abs() <= (high - low) / 3.0 {
+        return;
+    }
+    guess.checks.push(match held(&header, (low, high), others) {
+        Some(how) => format!(
+            "{header} {how}: it is taken to count from the rest length; if it has a zero of its own, write it as zero under \
+             [columns.displacement]"
+        ),
+        None => {
+            column.from_longest = true;
+            format!(
+                "{header} has a zero of its own: the stroke is counted from the greatest length in each file, which must be the rest length"
+            )
+        }
+    });
+}
+
+/// How a displacement shows that it is held and not moved: counted from the greatest length in each file, nothing would be left of it.
+fn held(header: &str, (low, high): (f64, f64), others: &Others<'_>) -> Option<String> {
+    if high - low > HELD * low.abs().max(high.abs()) {
+        return None;
+    }
+    let others = others.ranges(header);
+    let within = others.iter().map(|(l, h)| h - l).fold(high - low, f64::max);
+    let ends = others.iter().fold((low, high), |(a, b), (l, h)| (a.min(*l), b.max(*h)));
+    Some(if ends.1 - ends.0 > within {
+        format!("is held at {} to {} in different files", short(ends.0), short(ends.1))
+    } else {
+        format!("is held at {}", short(low))
+    })
+}
+
+/// The sign, which the force shows, or the pressure where the force shows nothing.
+fn sign(sample: &Sample, guess: &mut Guess) {
+    let values = |q: Quantity| {
+        let column = guess.columns.iter().find(|c| c.quantity == q)?;
+        let n = (0..sample.columns.len()).find(|n| roles::source(sample, *n) == column.source)?;
+        Some((column.scale.signum(), &sample.columns[n].numbers))
+    };
+    let Some((_, stroke)) = values(Quantity::Displacement) else { return };
+    let force: Option<Vec<f64>> =
+        values(Quantity::Force).map(|(sign, force)| force.iter().map(|f| sign * f).collect());
+    // An uncalibrated reading shows the sign as well, where nothing better is there.
+    let raw = || {
+        let is_force = |c: &&SampleColumn| {
+            c.is_numeric() && c.name.quantity().is_some_and(|(q, _)| q == Quantity::Force)
+        };
+        sample.columns.iter().find(is_force).map(|c| c.numbers.clone())
+    };
+    let force = force.or_else(raw);
+    let pressure = values(Quantity::Pressure).map(|(_, p)| p.as_slice());
+    let by_force =
+        force.and_then(|f| values::force_against(stroke, &f, pressure)).filter(|r| r.abs() > SHOWN);
+    // A muscle that moves freely shortens as its pressure rises.
+    let by_pressure =
+        || pressure.and_then(|p| values::pressure_against(stroke, p)).filter(|r| r.abs() > SHOWN);
+    let (lengthens, how) = match by_force {
+        Some(r) => (r > 0.0, ["rises", "falls"].map(|way| format!("the force {way} with"))),
+        None => match by_pressure() {
+            Some(r) => (r < 0.0, ["falls", "rises"].map(|way| format!("the pressure {way} with"))),
+            None => return,
+        },
+    };
+    let Some(column) = guess.columns.iter_mut().find(|c| c.quantity == Quantity::Displacement) else {
+        return;
+    };
+    if column.extension == lengthens {
+        return;
+    }
+    column.extension = lengthens;
+    let at = if by_force.is_some() { " at equal pressure" } else { "" };
+    let [longer, shorter] = how;
+    guess.checks.push(if lengthens {
+        format!("{longer} {}{at}: it is taken to grow as the muscle gets longer", column.header)
+    } else {
+        format!(
+            "{shorter} {}{at}: it is taken to grow as the muscle shortens, despite its name",
+            column.header
+        )
+    });
+}
