@@ -81,8 +81,13 @@ mod tests {
 
     #[test]
     fn states_without_correlation_count_singly() {
-        // A permutation of the numbers below 97 without order.
-        let pieces = of_states(&states(|p| (((p[0] * 16 + p[1] * 8 + p[2] + 1) * 35 % 97) - 48) as f64));
+        // Numbers without order (SplitMix64).
+        let pieces = of_states(&states(|p| {
+            let mut z = ((p[0] * 16 + p[1] * 8 + p[2] + 1) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        }));
         assert!((60.0..=96.0).contains(&pieces), "{pieces}");
     }
 
