@@ -58,6 +58,7 @@ impl Campaign {
             }
         }
         warnings.extend(other_clock(&recordings));
+        warnings.extend(recordings.iter().find_map(joined_runs));
         for (i, a) in recordings.iter().enumerate() {
             if let Some(b) = recordings[i + 1..].iter().find(|b| a.same_rows(b)) {
                 warnings.push(if a.name == b.name {
@@ -127,6 +128,39 @@ pub fn largest_force(campaign: &Campaign) -> f64 {
     top.get(kept - 1).or(top.last()).copied().unwrap_or(0.0)
 }
 
+/// A warning about a recording whose clock pauses while the length changes: runs at different lengths in one file look like motion.
+fn joined_runs(recording: &Recording) -> Option<String> {
+    /// A pause lasts this many sample intervals and seconds; rows that a logger lost are fewer.
+    const PAUSE: (f64, f64) = (20.0, 2.0);
+    /// The change of the stroke, as a share of its range: more than a held length yields in a pause.
+    const CHANGE: f64 = 0.05;
+    let (time, stroke) = (&recording.time, &recording.stroke);
+    let least = PAUSE.1.max(PAUSE.0 * typical_interval(time)?);
+    let pauses: Vec<usize> =
+        (1..time.len().min(stroke.len())).filter(|i| time[*i] - time[i - 1] > least).collect();
+    if pauses.is_empty() {
+        return None;
+    }
+    let range = stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let change = |i: &usize| (stroke[*i] - stroke[i - 1]).abs();
+    let at = pauses.into_iter().find(|i| change(i) > CHANGE * (range.1 - range.0))?;
+    Some(format!(
+        "the clock of `{}` pauses for {:.0} s at {:.2} s, and the length changes by {:.2} mm: if several runs are in one file, set them apart \
+         (`host import --guess` finds columns that number them)",
+        recording.name,
+        time[at] - time[at - 1],
+        time[at - 1],
+        1e3 * change(&at)
+    ))
+}
+
+/// The median time between rows, s, of some rows at the beginning.
+fn typical_interval(time: &[f64]) -> Option<f64> {
+    const ROWS: usize = 1000;
+    let mut steps: Vec<f64> = time.windows(2).take(ROWS).map(|w| w[1] - w[0]).collect();
+    (!steps.is_empty()).then(|| median(&mut steps))
+}
+
 /// A warning about a recording whose time has another unit than that of the others: its sample interval is a thousand times theirs, or a
 /// thousandth, and the stroke per row is the same.
 fn other_clock(recordings: &[Recording]) -> Option<String> {
@@ -187,6 +221,24 @@ mod tests {
         assert_eq!(twice, "`a` is given twice, and counts twice");
         let copied = warned(vec![from("a", 0.0, 60.0), from("copy", 0.0, 60.0)]);
         assert_eq!(copied, "`a` and `copy` hold the same rows, which count twice");
+    }
+
+    #[test]
+    fn runs_at_different_lengths_in_one_file_are_reported() {
+        let told = |pause: f64, mm: f64| {
+            let row = |i: i32| {
+                (0.1 * f64::from(i) + if i < 50 { 0.0 } else { pause }, if i < 50 { 0.0 } else { 1e-3 * mm })
+            };
+            let (time, stroke) = (0..100).map(row).unzip();
+            let recording = Recording { name: "a".into(), time, stroke, ..Recording::default() };
+            Campaign::new(vec![recording]).warnings.join("; ")
+        };
+        assert!(
+            told(30.0, 7.5)
+                .starts_with("the clock of `a` pauses for 30 s at 4.90 s, and the length changes by 7.50 mm")
+        );
+        // Lost rows during a motion, and a pause at one length, are no runs.
+        assert_eq!((told(1.0, 7.5), told(30.0, 0.0)), (String::new(), String::new()));
     }
 
     #[test]
