@@ -241,9 +241,16 @@ pam_data::criteria! {
     CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
     /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
     CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
-    /// How inexact the law of an effect is, share of its trace in each state. Laws whose traces differ by less are not distinguished.
+    /// How inexact the law of an effect may be, share of its trace in each state, each as likely as the others beforehand: from a law that is
+    /// nearly exact to one that is good to a fifth. A difference that no law describes better has no name.
+    CATALOGUE_LAW_ERRORS: ([f64; 3]) = [0.05, 0.1, 0.2], "catalogue_law_errors", "1", Judgement;
+    /// How inexact it usually is. Laws whose traces differ by less are not distinguished.
     CATALOGUE_LAW_ERROR: f64 = 0.15, "catalogue_law_error", "1", Judgement;
-    /// Independent pieces that the difference of a law from the actuator amounts to, at most.
+    /// Correlation of neighbouring states that is believed at most.
+    CATALOGUE_CORRELATED: f64 = 0.97, "catalogue_correlated", "1", Judgement;
+    /// Pairs of neighbours that a correlation is estimated from, at least.
+    CATALOGUE_NEIGHBOURS: usize = 4, "catalogue_neighbours", "1", Judgement;
+    /// Independent pieces that the difference of a law from the actuator amounts to, at most; their number is estimated.
     CATALOGUE_INDEPENDENT: f64 = 24.0, "catalogue_independent", "1", Judgement;
     /// Steps of the refinement of shapes.
     CATALOGUE_REFINED: usize = 6, "catalogue_refined", "1", Cost;

@@ -9,7 +9,9 @@
 mod answer;
 mod cells;
 mod metric;
+mod pieces;
 mod rests;
+mod taper;
 mod weigh;
 
 use super::answer::ChangeReport;

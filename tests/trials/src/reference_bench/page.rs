@@ -29,7 +29,8 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
         "{} of {drawn} pairs are answered, each once. The set's seed is secret; its SHA-256, `{hash}`, was written before the first pair was made. Strata are \
          mixed evenly over the numbers, so that a part of them is nearly a stratified share. Counted are single effects of at least {LEAST} % of the \
          blocked force (99.5 % quantile); the first name counts. A bound that is missed is missed: no set is drawn for one engine twice. The \
-         [first set](proof-reference-bench-first.md) was answered by an earlier engine; this one was drawn once the engine had changed.\n",
+         [first](proof-reference-bench-first.md) and the [second set](proof-reference-bench-second.md) were answered by earlier engines; this \
+         one was drawn once the engine had changed.\n",
         all.len()
     );
     let _ = writeln!(t, "| | n | bound | measured | |\n| --- | --- | --- | --- | --- |");
@@ -108,6 +109,29 @@ pub(super) fn page(all: &[Outcome], drawn: usize, hash: &str) -> String {
     );
     for (name, (right, of)) in by {
         let _ = writeln!(t, "| {name} | {right} | {of} |");
+    }
+    t.push_str(&stated(all));
+    t
+}
+
+/// Least stated probability of each row of the table.
+const STATED: [f64; 6] = [0.0, 0.5, 0.7, 0.9, 0.99, 1.0 + f64::EPSILON];
+
+/// How often the first name is right, by its stated probability.
+fn stated(all: &[Outcome]) -> String {
+    let mut t = String::from(
+        "\n## Stated probabilities, all single effects\n\nThe first name of each answer that names something, by its stated probability.\n\n\
+         | stated | answers | mean stated | right |\n| --- | --- | --- | --- |\n",
+    );
+    for ends in STATED.windows(2) {
+        let of = |o: &&Outcome| {
+            o.stratum == Stratum::Single && o.named.first().is_some_and(|n| n.1 >= ends[0] && n.1 < ends[1])
+        };
+        let own: Vec<&Outcome> = all.iter().filter(of).collect();
+        let mean = own.iter().map(|o| o.named[0].1).sum::<f64>() / own.len().max(1) as f64;
+        let mean = if own.is_empty() { "–".to_owned() } else { format!("{mean:.2}") };
+        let r = rate(&own, Outcome::exact);
+        let _ = writeln!(t, "| {:.2} to {:.2} | {} | {mean} | {r} |", ends[0], ends[1], own.len());
     }
     t
 }

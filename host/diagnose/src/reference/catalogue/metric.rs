@@ -78,6 +78,12 @@ impl<'a> Metric<'a> {
         let back = factor.solve(&self.images.tr_mul(v));
         own - &self.images * back
     }
+
+    /// `v` without what campaigns usually differ by and what was named before, as far as `v` shows them.
+    pub fn without_usual(&self, v: &DVector<f64>) -> DVector<f64> {
+        let Some(factor) = &self.factor else { return v.clone() };
+        v - &self.z * factor.solve(&self.images.tr_mul(v))
+    }
 }
 
 /// What campaigns usually differ by without a change, as columns of one standard deviation; and what was named before, at any size.
@@ -113,7 +119,7 @@ pub(super) fn usual(cells: &Cells, taken: &[DVector<f64>]) -> Vec<DVector<f64>> 
 /// What no law describes in each state, N, where one with this trace is there: beside `least`, a share of the trace in the state, and nowhere
 /// less than that share of the usual trace. Laws of memory or of turns are concentrated in few states, and their error with them.
 /// `state`: of each cell.
-pub(super) fn with_error(state: &[usize], trace: &DVector<f64>, least: &[f64]) -> Vec<f64> {
+pub(super) fn with_error(state: &[usize], trace: &DVector<f64>, least: &[f64], share: f64) -> Vec<f64> {
     let usual = (trace.norm_squared() / trace.len().max(1) as f64).sqrt();
     let mut sums = vec![(0.0, 0.0); least.len()];
     for (t, s) in trace.iter().zip(state) {
@@ -121,7 +127,7 @@ pub(super) fn with_error(state: &[usize], trace: &DVector<f64>, least: &[f64]) -
         *sum = (sum.0 + t * t, sum.1 + 1.0);
     }
     let own = |(square, count): (f64, f64)| f64::sqrt(square / f64::max(count, 1.0)).max(usual);
-    sums.into_iter().zip(least).map(|(sum, least)| least.hypot(CATALOGUE_LAW_ERROR * own(sum))).collect()
+    sums.into_iter().zip(least).map(|(sum, least)| least.hypot(share * own(sum))).collect()
 }
 
 /// Whether two traces differ by less than a law is inexact by, by their products in the metric: then the cells do not distinguish them, at any
@@ -139,7 +145,7 @@ mod tests {
     fn the_error_of_a_law_is_largest_where_its_trace_is() {
         // Four states of one cell each; the law shows in the last.
         let trace = DVector::from_vec(vec![0.0, 0.0, 0.0, 8.0]);
-        let error = with_error(&[0, 1, 2, 3], &trace, &[0.1; 4]);
+        let error = with_error(&[0, 1, 2, 3], &trace, &[0.1; 4], CATALOGUE_LAW_ERROR);
         assert!((error[3] - f64::hypot(0.1, CATALOGUE_LAW_ERROR * 8.0)).abs() < 1e-12, "{error:?}");
         assert!((error[0] - f64::hypot(0.1, CATALOGUE_LAW_ERROR * 4.0)).abs() < 1e-12, "{error:?}");
     }

@@ -1,23 +1,26 @@
 //! How strongly the cells support each effect of the catalogue as the change.
 
+use model_core::effects::Role;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::contrast::{log_mean, log_sum};
 use super::super::criteria::{
-    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_REFINED, CATALOGUE_USUAL, MOST_CHANGES, NAMED,
-    PRIOR_UNKNOWN, SIZES,
+    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_LAW_ERRORS, CATALOGUE_REFINED, CATALOGUE_USUAL,
+    MOST_CHANGES, NAMED, PRIOR_UNKNOWN, SIZES,
 };
 use super::super::shapes::{Change, Class};
 use super::cells::Cells;
 use super::metric::{Metric, is_same, usual, with_error};
+use super::pieces::independent;
+use super::taper;
 use crate::candidates::{Candidate, library};
 
 /// One effect at its best shape.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub change: Change,
-    /// Log evidence over no change.
+    /// Log evidence over no change, by the number of independent pieces.
     pub log: f64,
     /// Its parameters of either kind: name, unit, value, standard deviation; amplitudes first.
     pub parameters: Vec<(&'static str, &'static str, f64, f64)>,
@@ -25,6 +28,8 @@ pub(super) struct Fit {
     columns: Vec<DVector<f64>>,
     /// What it adds to the cells, N.
     pub trace: DVector<f64>,
+    /// Which of its alternative laws.
+    law: Option<usize>,
     shapes: Vec<f64>,
 }
 
@@ -50,13 +55,39 @@ pub(super) struct Weighed {
     pub alone: Vec<Fit>,
 }
 
-/// An effect at one set of shapes; `None` where the cells do not show it.
-fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]) -> Option<Fit> {
-    let columns: Vec<DVector<f64>> =
-        candidate.columns(shapes, &cells.rows).iter().map(|c| cells.means(c)).collect();
+/// The laws of an effect: each amplitude alone where they are alternatives, otherwise all together. What the tapers enclose less and what the
+/// slant of their fibres costs are parts of one law.
+fn laws(candidate: &Candidate) -> Vec<Option<usize>> {
+    let alone = if candidate.info.alternatives { amplitudes(candidate).len() } else { 0 };
+    let together = alone == 0 || taper::belongs(candidate);
+    (0..alone).map(Some).chain(together.then_some(None)).collect()
+}
+
+/// Name and unit of each amplitude of an effect.
+fn amplitudes(candidate: &Candidate) -> Vec<(&'static str, &'static str)> {
+    let own = candidate.info.parameters.iter().filter(|p| matches!(p.role, Role::Amplitude));
+    own.map(|p| (p.name, p.unit)).chain(taper::belongs(candidate).then_some(taper::PARAMETER)).collect()
+}
+
+/// The columns of an effect at one set of shapes, N per unit of each amplitude.
+fn columns(cells: &Cells, candidate: &Candidate, shapes: &[f64]) -> Vec<DVector<f64>> {
+    let mut columns = candidate.columns(shapes, &cells.rows);
+    columns.extend(taper::belongs(candidate).then(|| taper::column(&cells.rows)));
+    columns.iter().map(|c| cells.means(c)).collect()
+}
+
+/// One law of an effect at one set of shapes; `None` where the cells do not show it.
+fn fit(
+    cells: &Cells,
+    metric: &Metric<'_>,
+    candidate: &Candidate,
+    (law, shapes): (Option<usize>, &[f64]),
+    columns: &[DVector<f64>],
+) -> Option<Fit> {
     let n = cells.cells.len() as f64;
     let rms: Vec<f64> = columns.iter().map(|c| (c.norm_squared() / n).sqrt()).collect();
-    let live: Vec<usize> = (0..columns.len()).filter(|k| rms[*k] > 0.0 && rms[*k].is_finite()).collect();
+    let own = |k: &usize| law.is_none_or(|l| l == *k) && rms[*k] > 0.0 && rms[*k].is_finite();
+    let live: Vec<usize> = (0..columns.len()).filter(own).collect();
     if live.is_empty() {
         return None;
     }
@@ -87,36 +118,40 @@ fn fit(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate, shapes: &[f64]
     }
     let trace = &u * &mean;
     let mut parameters: Vec<_> = Vec::new();
-    let amplitudes =
-        candidate.info.parameters.iter().filter(|p| matches!(p.role, model_core::effects::Role::Amplitude));
-    for (i, p) in amplitudes.enumerate() {
+    let named = amplitudes(candidate).into_iter().enumerate();
+    for (i, (name, unit)) in named.filter(|(i, _)| law.is_none_or(|l| l == *i)) {
         let (value, std) = live
             .iter()
             .position(|l| *l == i)
             .map_or((0.0, 0.0), |j| (mean[j] / rms[i], covariance[(j, j)].max(0.0).sqrt() / rms[i]));
-        parameters.push((p.name, p.unit, value, std));
+        parameters.push((name, unit, value, std));
     }
     parameters.extend(candidate.shapes().zip(shapes).map(|(p, s)| (p.name, p.unit, *s, 0.0)));
     let change = Change::from_name(candidate.name())?;
     let columns = live.iter().map(|k| columns[*k].clone()).collect();
-    Some(Fit { change, log, parameters, columns, trace, shapes: shapes.to_vec() })
+    Some(Fit { change, log, parameters, columns, trace, law, shapes: shapes.to_vec() })
 }
 
-/// The best shape of one effect, and the log share of the grid that its evidence is a mean over.
+/// The best law and shape of one effect, and the log share of the laws and shapes that its evidence is a mean over.
 fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fit, f64)> {
     let grid = candidate.grid();
-    let fits: Vec<Fit> = grid.iter().filter_map(|shapes| fit(cells, metric, candidate, shapes)).collect();
+    let laws = laws(candidate);
+    let at = |shapes: &Vec<f64>| -> Vec<Fit> {
+        let columns = columns(cells, candidate, shapes);
+        laws.iter().filter_map(|law| fit(cells, metric, candidate, (*law, shapes), &columns)).collect()
+    };
+    let fits: Vec<Fit> = grid.iter().flat_map(at).collect();
     let logs: Vec<f64> = fits.iter().map(|f| f.log).collect();
-    let mean = log_sum(&logs) - (grid.len().max(1) as f64).ln();
+    let mean = log_sum(&logs) - ((grid.len() * laws.len()).max(1) as f64).ln();
     let mut best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
     let (coarse, mut step) = (best.log, 0.06);
     for _ in 0..CATALOGUE_REFINED {
         let near = candidate.neighbours(&best.shapes, step);
-        let better = near
-            .iter()
-            .filter_map(|shapes| fit(cells, metric, candidate, shapes))
-            .max_by(|a, b| a.log.total_cmp(&b.log))
-            .filter(|f| f.log > best.log);
+        let law = |shapes: &Vec<f64>| {
+            fit(cells, metric, candidate, (best.law, shapes), &columns(cells, candidate, shapes))
+        };
+        let better =
+            near.iter().filter_map(law).max_by(|a, b| a.log.total_cmp(&b.log)).filter(|f| f.log > best.log);
         match better {
             Some(f) => best = f,
             None => step /= 2.0,
@@ -126,16 +161,30 @@ fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fi
     Some((best, mean - coarse))
 }
 
-/// The evidence of a law over no change where its error is a share of its own trace.
+/// A law with each size of its own error: the best of these fits, and the log evidence of each over no change.
+struct Inexact {
+    fit: Fit,
+    logs: Vec<f64>,
+}
+
+/// A law where its error is a share of its own trace. `base`: log density of no change, less what the choice of a shape costs.
 fn with_own_error(
     cells: &Cells,
     usual: &[DVector<f64>],
     candidate: &Candidate,
     (found, least): (Fit, &[f64]),
-) -> Fit {
-    let metric = Metric::of(cells, usual, &with_error(&cells.group, &found.trace, least));
-    let Some(own) = fit(cells, &metric, candidate, &found.shapes) else { return found };
-    Fit { log: own.log + metric.density, ..own }
+    base: f64,
+) -> Inexact {
+    let columns = columns(cells, candidate, &found.shapes);
+    let at = |share: &f64| {
+        let metric = Metric::of(cells, usual, &with_error(&cells.group, &found.trace, least, *share));
+        let own = fit(cells, &metric, candidate, (found.law, &found.shapes), &columns)?;
+        Some(Fit { log: own.log + metric.density - base, ..own })
+    };
+    let fits: Vec<Fit> = CATALOGUE_LAW_ERRORS.iter().filter_map(at).filter(|f| f.log.is_finite()).collect();
+    let logs = fits.iter().map(|f| f.log).collect();
+    let best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log));
+    Inexact { fit: best.unwrap_or(found), logs }
 }
 
 /// For each law, those that these cells do not tell from it.
@@ -165,20 +214,27 @@ impl Round {
         let metric = Metric::of(cells, &columns, &beyond(CATALOGUE_LAW_ERROR * size));
         let one = |candidate: &Candidate| {
             let (found, occam) = scan(cells, &metric, candidate)?;
-            let own = with_own_error(cells, &columns, candidate, (found, least));
-            Some(Fit { log: own.log + occam - still.density, ..own })
+            Some(with_own_error(cells, &columns, candidate, (found, least), still.density - occam))
         };
-        let mut fits: Vec<Fit> = candidates.par_iter().filter_map(one).collect();
+        let found: Vec<Inexact> =
+            candidates.par_iter().filter_map(one).filter(|l| !l.logs.is_empty()).collect();
+        // States differ from a law together, not one by one; each pressure was recorded alone.
+        let best = found.iter().max_by(|a, b| log_mean(&a.logs).total_cmp(&log_mean(&b.logs)));
+        let left = best.map_or_else(|| cells.difference.clone(), |b| &cells.difference - &b.fit.trace);
+        let pieces = independent(cells, &metric.without_usual(&left))
+            .max(cells.levels.len() as f64)
+            .min(CATALOGUE_INDEPENDENT);
+        let factor = (cells.groups as f64 / pieces).max(1.0);
+        let tempered = |logs: &[f64]| log_mean(&logs.iter().map(|l| l / factor).collect::<Vec<f64>>());
+        let mut fits: Vec<Fit> = found.into_iter().map(|l| Fit { log: tempered(&l.logs), ..l.fit }).collect();
         fits.sort_by(|a, b| b.log.total_cmp(&a.log).then(a.change.cmp(&b.change)));
         let free =
             SIZES.map(|s| Metric::of(cells, &columns, &beyond(s * cells.largest)).density - still.density);
-        let unknown = log_mean(&free);
-        // States differ from a law together, not one by one.
-        let factor = (cells.groups as f64 / CATALOGUE_INDEPENDENT).max(1.0);
+        let unknown = tempered(&free);
         let share = (1.0 - none - PRIOR_UNKNOWN).max(1e-3) / fits.len().max(1) as f64;
-        let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown / factor]
+        let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown]
             .into_iter()
-            .chain(fits.iter().map(|f| share.ln() + f.log / factor))
+            .chain(fits.iter().map(|f| share.ln() + f.log))
             .collect();
         let total = log_sum(&logs);
         let p: Vec<f64> = logs.iter().map(|l| (l - total).exp()).collect();
@@ -241,7 +297,7 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
         }
         taken.extend(next.fit.columns.iter().cloned());
         // What a law leaves of what it explains, no law describes.
-        least = with_error(&cells.group, &next.fit.trace, &least);
+        least = with_error(&cells.group, &next.fit.trace, &least, CATALOGUE_LAW_ERROR);
         accepted.push(next);
         round = Round::of(cells, &candidates, &taken, none, &least);
     }
@@ -260,6 +316,7 @@ mod tests {
                 parameters: Vec::new(),
                 columns: Vec::new(),
                 trace: DVector::zeros(1),
+                law: None,
                 shapes: Vec::new(),
             };
             (fit, *p)
