@@ -113,9 +113,8 @@ programs() {
 # Names as options of `cargo test`.
 chosen() { sed 's/^/--test /'; }
 
-# Tests of the emulated controller wait for most of their time, so they run beside the others. These leave it the processor, as a controller
-# that gets none falls silent. The same packages are selected for both:
-# others would have other features, and compile everything again. A name that both have runs here.
+# Tests of the emulated controller run alone: a controller that gets no processor falls silent. The same packages are selected as for the
+# other tests: others would have other features, and compile everything again. A name that both have runs here.
 emulator_tests() {
     # shellcheck disable=SC2046 # words on purpose
     cargo test --workspace --locked --no-fail-fast $(programs /tests/emulator/ | chosen)
@@ -124,9 +123,9 @@ emulator_tests() {
 other_tests() {
     local status=0
     # shellcheck disable=SC2046 # words on purpose
-    nice -n 10 cargo test --workspace --locked --no-fail-fast --lib --bins --examples \
+    cargo test --workspace --locked --no-fail-fast --lib --bins --examples \
         $(comm -23 <(programs .) <(programs /tests/emulator/) | chosen) || status=1
-    nice -n 10 cargo test --workspace --locked --no-fail-fast --doc || status=1
+    cargo test --workspace --locked --no-fail-fast --doc || status=1
     return $status
 }
 
@@ -172,9 +171,9 @@ else
     step "firmware image, emulated" firmware/build --install mps2-an386
     step "firmware image, Nucleo" firmware/build nucleo-f446re
     step "build of the tests" cargo test --quiet --workspace --locked --no-run
-    beside "tests with the emulator" emulator_tests
+    step "tests with the emulator" emulator_tests
     if require "Python bindings" python3 python3 python3-venv; then
-        beside "Python bindings" nice -n 10 bash host/python/tests/run.sh
+        beside "Python bindings" bash host/python/tests/run.sh
     fi
     step "tests" other_tests
     if require "live view in a browser" python3 python3 && require "live view in a browser" chromedriver chromium chromium-driver; then
