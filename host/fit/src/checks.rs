@@ -185,15 +185,15 @@ struct Uncertainty {
 impl Uncertainty {
     /// Of repeated readings, whose reference may be off by up to `limit`, every error within it being equally likely
     /// (JCGM 100:2008, 4.3.7).
-    fn with_reference(deviation: f64, freedom: usize, limit: f64) -> Self {
+    fn with_reference(deviation: f64, freedom: f64, limit: f64) -> Self {
         let reference = limit / 3.0_f64.sqrt();
-        let variances = [(deviation * deviation, freedom as f64), (reference * reference, f64::INFINITY)];
+        let variances = [(deviation * deviation, freedom), (reference * reference, f64::INFINITY)];
         Self { deviation: deviation.hypot(reference), freedom: effective_freedom(&variances) }
     }
 
     /// Of repeated readings alone.
-    fn of(deviation: f64, freedom: usize) -> Self {
-        Self { deviation, freedom: freedom as f64 }
+    fn of(deviation: f64, freedom: f64) -> Self {
+        Self { deviation, freedom }
     }
 
     fn scaled(self, factor: f64) -> Self {

@@ -35,7 +35,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         let middle = 0.5 * (t.first().unwrap_or(&0.0) + t.last().unwrap_or(&0.0));
         columns.push(t.iter().map(|t| t - middle).collect());
     }
-    let Some(found) = by_blocks(&columns, &off, &block) else {
+    let Some(found) = by_blocks(&columns, &off, &block, table.rising_time()) else {
         return Err(table.poor(
             "the weights do not determine gain and offset: use at least three different ones, each for some seconds; where the line was \
              under pressure, use all of them with and without pressure",

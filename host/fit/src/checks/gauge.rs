@@ -14,7 +14,8 @@ const REFERENCE_ERROR: f64 = 1e-3;
 pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     let (read, known) = (table.need(Quantity::Pressure)?, table.reference(Quantity::Pressure)?);
     let off: Vec<f64> = read.iter().zip(known).map(|(r, k)| r - k).collect();
-    let found = by_blocks(&[known.to_vec(), vec![1.0; read.len()]], &off, &stays(&[known]));
+    let columns = [known.to_vec(), vec![1.0; read.len()]];
+    let found = by_blocks(&columns, &off, &stays(&[known]), table.rising_time());
     let Some(found) = found else {
         return Err(table.poor(
             "the pressures do not separate gain from offset: use at least three different ones, each for some seconds",

@@ -29,7 +29,8 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
     if both {
         columns.push(pick(&|i| -0.5 * force[i].signum()));
     }
-    let Some(found) = by_blocks(&columns, &off, &block) else {
+    let time = table.rising_time().map(|t| pick(&|i| t[i]));
+    let Some(found) = by_blocks(&columns, &off, &block, time.as_deref()) else {
         return Err(table.poor(
             "the force on the bar changes too little: pull and push it slowly, up to the muscle's force",
         ));

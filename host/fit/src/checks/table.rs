@@ -81,6 +81,11 @@ impl Table {
         self.columns.iter().find(|c| c.0 == quantity && !c.1).map(|c| c.2.as_slice())
     }
 
+    /// The time of each row, s, where it rises throughout.
+    pub(super) fn rising_time(&self) -> Option<&[f64]> {
+        self.find(Quantity::Time).filter(|t| t.is_sorted())
+    }
+
     /// A column that the check cannot do without.
     pub(super) fn need(&self, quantity: Quantity) -> Result<&[f64]> {
         self.find(quantity).ok_or_else(|| self.missing("", quantity))

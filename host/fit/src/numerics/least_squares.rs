@@ -8,6 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::jackknife::variances;
 
+mod serial_correlation;
+
 /// The `order` coefficients of least squares. A row holds the values of its columns, of which the first `order` count, and its target.
 ///
 /// Columns are scaled to unit size and reduced to a triangle by Householder reflections (QR). The triangle is solved by its singular
@@ -58,8 +60,8 @@ pub struct BlockSolution {
     pub values: Vec<f64>,
     /// Their standard deviations.
     pub deviations: Vec<f64>,
-    /// Degrees of freedom of these deviations: blocks beyond the columns.
-    pub freedom: usize,
+    /// Degrees of freedom of these deviations: blocks beyond the columns, fewer where blocks share slow noise.
+    pub freedom: f64,
 }
 
 /// Normal equations of some rows.
@@ -84,12 +86,18 @@ impl Normal {
     }
 }
 
-/// Fits `y` by the columns. Rows of one block may be correlated; standard deviations come from leaving each block out in turn.
+/// Fits `y` by the columns. Rows of one block may be correlated; standard deviations come from leaving each block out in turn. With the
+/// times of the rows, s, rising, what neighbouring blocks share of slow noise counts, too.
 ///
 /// `None` where the columns are linearly dependent, with all blocks or with one left out, or where there are no more blocks than
 /// columns.
 #[must_use]
-pub fn by_blocks(columns: &[Vec<f64>], y: &[f64], block: &[usize]) -> Option<BlockSolution> {
+pub fn by_blocks(
+    columns: &[Vec<f64>],
+    y: &[f64],
+    block: &[usize],
+    time: Option<&[f64]>,
+) -> Option<BlockSolution> {
     let mut blocks = block.to_vec();
     blocks.dedup();
     let k = columns.len();
@@ -111,10 +119,16 @@ pub fn by_blocks(columns: &[Vec<f64>], y: &[f64], block: &[usize]) -> Option<Blo
         })
         .collect::<Option<Vec<_>>>()?;
     let variances = variances(&without.iter().map(|w| w.as_slice()).collect::<Vec<_>>());
+    let values: Vec<f64> = (0..k).map(|j| solution[j] / sizes[j]).collect();
+    let fitted = |i: usize| (0..k).map(|j| values[j] * columns[j][i]).sum::<f64>();
+    let residual: Vec<f64> = y.iter().enumerate().map(|(i, y)| y - fitted(i)).collect();
+    let shared = time.and_then(|time| serial_correlation::correlated(columns, &residual, block, time));
+    let factor = |j: usize| shared.as_ref().map_or(1.0, |s| s.factors[j]);
+    let freedom = (blocks.len() - k) as f64;
     Some(BlockSolution {
-        values: (0..k).map(|j| solution[j] / sizes[j]).collect(),
-        deviations: (0..k).map(|j| variances[j].sqrt() / sizes[j]).collect(),
-        freedom: blocks.len() - k,
+        deviations: (0..k).map(|j| factor(j) * variances[j].sqrt() / sizes[j]).collect(),
+        freedom: shared.as_ref().map_or(freedom, |s| s.freedom.min(freedom)),
+        values,
     })
 }
 
@@ -128,7 +142,7 @@ mod tests {
         let off = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
         let block: Vec<usize> = (0..1000).map(|i| i / 100).collect();
         let y: Vec<f64> = block.iter().map(|b| 5.0 + off[*b]).collect();
-        let s = by_blocks(&[vec![1.0; 1000]], &y, &block).expect("solvable");
+        let s = by_blocks(&[vec![1.0; 1000]], &y, &block, None).expect("solvable");
         assert!((s.values[0] - 5.0).abs() < 1e-12);
         // One over the root of ten stays (nine degrees of freedom), not of a thousand samples.
         assert!((s.deviations[0] - 1.0 / 3.0).abs() < 0.02, "{}", s.deviations[0]);
@@ -140,13 +154,13 @@ mod tests {
         let x: Vec<f64> = (0..40).map(|i| if i < 30 { 0.0 } else { 10.0 }).collect();
         let block: Vec<usize> = (0..40).map(|i| i / 10).collect();
         let y: Vec<f64> = x.iter().map(|x| 1.0 + 0.5 * x).collect();
-        assert!(by_blocks(&[x.clone(), vec![1.0; 40]], &y, &block).is_none());
+        assert!(by_blocks(&[x.clone(), vec![1.0; 40]], &y, &block, None).is_none());
     }
 
     #[test]
     fn columns_that_are_the_same_are_refused() {
         let x: Vec<f64> = (0..50).map(f64::from).collect();
         let block: Vec<usize> = (0..50).map(|i| i / 5).collect();
-        assert!(by_blocks(&[x.clone(), x.iter().map(|v| 2.0 * v).collect()], &x, &block).is_none());
+        assert!(by_blocks(&[x.clone(), x.iter().map(|v| 2.0 * v).collect()], &x, &block, None).is_none());
     }
 }
