@@ -5,7 +5,7 @@ use crate::recording::Quantity;
 use crate::short_number::short;
 
 /// Gauge pressures of pneumatic muscles, Pa: from the threshold of a thin bladder to the compressed air of a building.
-const PRESSURES: (f64, f64) = (100e3, 1e6);
+pub(super) const PRESSURES: (f64, f64) = (100e3, 1e6);
 /// Strokes of pneumatic muscles on a bench, m.
 const STROKES: (f64, f64) = (1e-3, 0.5);
 /// Times between rows, s: loggers record at 2 Hz to 20 kHz.
@@ -53,6 +53,12 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn) -> Option<Sug
         Quantity::Temperature => Some(Suggested { unit: "C", scale: 1.0, others: vec![] }),
         _ => Some(Suggested { unit: "", scale: 1.0, others: vec![] }),
     }
+}
+
+/// Whether all numbers are the same.
+pub(super) fn is_constant(column: &SampleColumn) -> bool {
+    let (low, high) = column.range();
+    low == high
 }
 
 /// The median step between rows.
@@ -112,11 +118,16 @@ pub(super) fn force_against(stroke: &[f64], force: &[f64], pressure: Option<&[f6
 
 /// Correlation of pressure with displacement where the pressure varies on purpose: positive where the displacement shortens the muscle.
 pub(super) fn pressure_against(stroke: &[f64], pressure: &[f64]) -> Option<f64> {
+    is_varied(pressure).then(|| correlation(pressure, stroke))?
+}
+
+/// Whether a pressure varies on purpose, by more than a regulator's droop.
+pub(super) fn is_varied(pressure: &[f64]) -> bool {
     /// A regulator's droop is less than this share of the highest pressure.
     const VARIED: f64 = 0.5;
-    let finite = || pressure.iter().copied().filter(|p| p.is_finite());
-    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
-    (high - low > VARIED * low.abs().max(high.abs())).then(|| correlation(pressure, stroke))?
+    let finite = pressure.iter().copied().filter(|p| p.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    high - low > VARIED * low.abs().max(high.abs())
 }
 
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
