@@ -226,3 +226,32 @@ fn what_a_file_lacks_is_told_with_the_right_remedy() {
     let two = told(format!("Time_1,Press_1,Ext_1,Load_1,Time_2,Press_2,Ext_2,Load_2\n{rows}"));
     assert!(two.contains("side by side"), "{two}");
 }
+
+#[test]
+fn a_rest_length_that_is_held_within_the_noise_of_a_sensor_is_no_stroke() {
+    let rows = (0..40).fold(String::new(), |mut text, i| {
+        let kpa = 100 + 10 * (20 - (i - 20_i32).abs());
+        writeln!(text, "{i},{kpa},{:.4},{}", 0.001 * f64::from(i % 3 - 1), kpa / 2).unwrap();
+        text
+    });
+    let file = format!("time_s,pressure_kPa,displacement_mm,force_N\n{rows}").into_bytes();
+    let (guess, _) = read(&[("a.csv", file)]);
+    assert!(!guess.description.contains("longest"), "{}", guess.description);
+}
+
+#[test]
+fn units_that_no_name_says_are_those_that_suit_all_files() {
+    let file = |bar: f64, mm: f64| {
+        let rows = stroke(|[t, _, x, f]| format!("{t:.2},{bar},{:.4},{f:.3}", 0.25 * x * mm));
+        format!("time,pressure,stroke,force\n{rows}").into_bytes()
+    };
+    let (guess, recordings) = read(&[("a.csv", file(0.5, 0.4)), ("b.csv", file(3.0, 6.0))]);
+    let recordings = recordings.unwrap_or_else(|e| panic!("{} {e}", guess.description));
+    assert_eq!(
+        (recordings[0].pressure[0], recordings[1].pressure[0]),
+        (50e3, 300e3),
+        "{}",
+        guess.description
+    );
+    assert!((recordings[1].stroke[20] - 6e-3).abs() < 1e-9, "{}", guess.description);
+}

@@ -1,5 +1,6 @@
 //! The other files of the same bench: they may show what is uncertain from one file.
 
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
 use super::sample::{Sample, SampleColumn};
@@ -11,7 +12,9 @@ const COMPARED: usize = 30;
 pub(super) struct Others<'a> {
     pub files: &'a [PathBuf],
     /// The sheet of workbooks.
-    pub sheet: Option<&'a str>,
+    sheet: Option<&'a str>,
+    /// What the columns of each file hold.
+    seen: OnceCell<Vec<Vec<(String, Range)>>>,
 }
 
 /// Where the numbers of a column lie in one file.
@@ -34,15 +37,24 @@ impl Range {
     }
 }
 
-impl Others<'_> {
+impl<'a> Others<'a> {
+    /// These files beside the first; they are read once, when something asks for their contents.
+    pub(super) fn of(files: &'a [PathBuf], sheet: Option<&'a str>) -> Self {
+        Self { files, sheet, seen: OnceCell::new() }
+    }
+
     /// The range of a column in each file that has it. Files that cannot be read are left out.
     pub(super) fn ranges(&self, header: &str) -> Vec<Range> {
-        let range = |file: &PathBuf| {
+        let of_file = |file: &PathBuf| -> Option<Vec<(String, Range)>> {
             // What a pipe gives once is left for the reader.
             let sample = file.is_file().then(|| Sample::read(file, self.sheet).ok())??;
-            sample.columns.iter().find(|c| c.header == header).map(Range::of)
+            let numeric = sample.columns.iter().filter(|c| c.is_numeric());
+            Some(numeric.map(|c| (c.header.clone(), Range::of(c))).collect())
         };
-        self.files.iter().take(COMPARED).filter_map(range).collect()
+        let seen = self.seen.get_or_init(|| self.files.iter().take(COMPARED).filter_map(of_file).collect());
+        let one =
+            |file: &Vec<(String, Range)>| file.iter().find(|(h, _)| h == header).map(|(_, range)| *range);
+        seen.iter().filter_map(one).collect()
     }
 
     /// Their names without folders.

@@ -49,7 +49,7 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
             continue;
         }
         if let Some(n) = best(sample, quantity, &used, &mut guess)
-            && let Some(column) = described(sample, n, quantity, &mut guess)
+            && let Some(column) = described(sample, n, quantity, others, &mut guess)
         {
             used[n] = true;
             guess.columns.push(column);
@@ -116,7 +116,13 @@ fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -
 }
 
 /// A column in its unit; `None` where it cannot be used.
-fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -> Option<GuessedColumn> {
+fn described(
+    sample: &Sample,
+    n: usize,
+    quantity: Quantity,
+    others: &Others<'_>,
+    guess: &mut Guess,
+) -> Option<GuessedColumn> {
     let column = &sample.columns[n];
     let (header, what) = (&column.header, quantity.name().replace('_', " "));
     if column.name.is_raw() {
@@ -132,13 +138,12 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
     } else if let Some(text) = &column.name.unknown_unit {
         guess.unknown.push(format!("{header} looks like {what}, but its unit `{text}` is not known"));
         return None;
-    } else if quantity == Quantity::Contraction && column.range().1 > 1.0 {
+    } else if quantity == Quantity::Contraction && largest(column, others) > 1.0 {
         scale = 0.01;
-        guess
-            .checks
-            .push(format!("{header} is taken as per cent, since it reaches {}", short(column.range().1)));
+        let reached = short(largest(column, others));
+        guess.checks.push(format!("{header} is taken as per cent, since it reaches {reached}"));
     } else if quantity.units().len() > 1 {
-        let Some(suggested) = values::suggested(quantity, column) else {
+        let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
             let (low, high) = column.range();
             guess.unknown.push(format!(
                 "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
@@ -195,6 +200,13 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
         values: Vec::new(),
         range: Some((low, high)),
     })
+}
+
+/// The largest number of a column in all files, of either sign.
+fn largest(column: &SampleColumn, others: &Others<'_>) -> f64 {
+    let (low, high) = column.range();
+    let all = others.ranges(&column.header);
+    all.iter().map(|r| r.high.max(-r.low)).fold(high.max(-low), f64::max)
 }
 
 /// Labels, directions, the list of runs and the muscles of a file.

@@ -3,7 +3,7 @@
 use super::others::{Others, Range};
 use super::sample::{Sample, SampleColumn};
 use super::{Guess, GuessedColumn, roles, values};
-use crate::recording::Quantity;
+use crate::recording::{Quantity, columns};
 use crate::short_number::short;
 
 /// A correlation of force with displacement at equal pressure from which the sign of the displacement is taken as shown. Uncorrelated
@@ -31,7 +31,8 @@ pub(super) fn judge(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
     let at = (0..sample.columns.len()).find(|n| roles::source(sample, *n) == column.source);
     let Some(own) = at.map(|n| Range::of(&sample.columns[n])) else { return };
     let moved = moves_the_force(sample, guess);
-    let held = if moved { None } else { held(&header, own, others) };
+    let si = Quantity::Displacement.unit(column.unit).map_or(1.0, |u| u.scale * column.scale.abs());
+    let held = if moved { None } else { held(&header, own, si, others) };
     let Some(column) = guess.columns.iter_mut().find(is_stroke) else { return };
     guess.checks.push(match held {
         Some(how) => format!(
@@ -48,7 +49,7 @@ pub(super) fn judge(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
 }
 
 /// How a displacement shows that it is held and not moved: counted from the greatest length in each file, nothing would be left of it.
-fn held(header: &str, own: Range, others: &Others<'_>) -> Option<String> {
+fn held(header: &str, own: Range, si: f64, others: &Others<'_>) -> Option<String> {
     let mut files = others.ranges(header);
     files.push(own);
     // The file that moves most decides: at a low pressure a muscle moves by little.
@@ -56,7 +57,7 @@ fn held(header: &str, own: Range, others: &Others<'_>) -> Option<String> {
     let middles = files.iter().map(|r| 0.5 * (r.low + r.high));
     let (low, high) = middles.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
     let apart = high - low > APART * within;
-    if !(within <= HELD * low.abs().max(high.abs()) || apart) {
+    if !(within <= HELD * low.abs().max(high.abs()) || within * si <= columns::HELD || apart) {
         return None;
     }
     Some(if apart {

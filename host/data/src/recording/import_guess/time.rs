@@ -47,7 +47,7 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
             && !values::counts_rows(c)
     };
     if let Some((n, column)) = sample.columns.iter().enumerate().find(unnamed)
-        && let Some(suggested) = values::suggested(Quantity::Time, column)
+        && let Some(suggested) = values::suggested(Quantity::Time, column, &[])
     {
         if sample.columns.iter().any(|c| is_time(c) && !c.is_numeric()) {
             return;

@@ -1,5 +1,6 @@
 //! What the values of a column say: the unit that a name does not say, and whether a unit can be right.
 
+use super::others::Range;
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
 use crate::short_number::short;
@@ -28,9 +29,12 @@ fn allowed(value: f64, bounds: (f64, f64), units: &[(&'static str, f64, f64)]) -
     Some(Suggested { unit, scale, others: fits.map(|(u, ..)| *u).collect() })
 }
 
-/// A unit for values whose name says none; `None` where they fit none or several quantities need none.
-pub(super) fn suggested(quantity: Quantity, column: &SampleColumn) -> Option<Suggested> {
+/// A unit for values whose name says none; `None` where they fit none or several quantities need none. `others`: what the same column
+/// holds in other files of the bench, since the first may be that of the lowest pressure.
+pub(super) fn suggested(quantity: Quantity, column: &SampleColumn, others: &[Range]) -> Option<Suggested> {
     let (low, high) = column.range();
+    let widest = others.iter().map(|r| r.high - r.low).fold(high - low, f64::max);
+    let high = others.iter().map(|r| r.high).fold(high, f64::max);
     match quantity {
         Quantity::Pressure | Quantity::PressureCommand => {
             let units = [
@@ -43,7 +47,7 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn) -> Option<Sug
             allowed(high, PRESSURES, &units)
         }
         Quantity::Displacement | Quantity::Length | Quantity::RestLength => {
-            let size = if quantity == Quantity::Displacement { high - low } else { high };
+            let size = if quantity == Quantity::Displacement { widest } else { high };
             allowed(size, STROKES, &[("mm", 1.0, 1e-3), ("m", 1.0, 1.0), ("in", 1.0, 0.0254)])
         }
         Quantity::Time => {
@@ -153,7 +157,7 @@ mod tests {
 
     #[test]
     fn values_suggest_the_unit_that_a_muscle_allows() {
-        let unit = |q, high: f64| suggested(q, &column([0.0, high])).map(|s| s.unit);
+        let unit = |q, high: f64| suggested(q, &column([0.0, high]), &[]).map(|s| s.unit);
         assert_eq!(unit(Quantity::Pressure, 620.0), Some("kPa"));
         assert_eq!(unit(Quantity::Pressure, 6.2), Some("bar"));
         assert_eq!(unit(Quantity::Pressure, 90.0), Some("psi"));
@@ -163,12 +167,15 @@ mod tests {
         assert_eq!(unit(Quantity::Displacement, 35.0), Some("mm"));
         assert_eq!(unit(Quantity::Displacement, 0.035), Some("m"));
         let at = |step: f64| {
-            suggested(Quantity::Time, &column((0..20).map(|i| f64::from(i) * step))).expect("a unit")
+            suggested(Quantity::Time, &column((0..20).map(|i| f64::from(i) * step)), &[]).expect("a unit")
         };
         assert_eq!((at(0.01).unit, at(10.0).unit), ("s", "ms"));
         assert_eq!((at(1000.0).unit, at(1000.0).scale), ("ms", 1e-3));
         // 120 may be kPa or psi, and is reported so.
-        assert_eq!(suggested(Quantity::Pressure, &column([0.0, 120.0])).map(|s| s.others), Some(vec!["psi"]));
+        assert_eq!(
+            suggested(Quantity::Pressure, &column([0.0, 120.0]), &[]).map(|s| s.others),
+            Some(vec!["psi"])
+        );
     }
 
     #[test]
