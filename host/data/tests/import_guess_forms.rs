@@ -255,3 +255,26 @@ fn units_that_no_name_says_are_those_that_suit_all_files() {
     );
     assert!((recordings[1].stroke[20] - 6e-3).abs() < 1e-9, "{}", guess.description);
 }
+
+#[test]
+fn files_with_another_order_of_columns_are_told_where_columns_are_counted() {
+    let machine = |names: &str, row: fn([f64; 4]) -> String| format!("{names}\n{}", stroke(row)).into_bytes();
+    let first = machine("Time\tPressure\tStroke\tForce\ns\tkPa\tmm\tN", |[t, p, x, f]| {
+        format!("{t:.2}\t{p}\t{x:.3}\t{f:.3}")
+    });
+    let other = machine("Time\tForce\tStroke\tPressure\ns\tN\tmm\tkPa", |[t, p, x, f]| {
+        format!("{t:.2}\t{f:.3}\t{x:.3}\t{p}")
+    });
+    let told =
+        |second: &Vec<u8>| read(&[("a.txt", first.clone()), ("b.txt", second.clone())]).0.unknown.join("; ");
+    assert!(told(&other).contains("b.txt have other names or another order"), "{}", told(&other));
+    assert_eq!(told(&first), "");
+}
+
+#[test]
+fn decimal_commas_in_quotation_marks_may_stand_between_commas() {
+    let rows = stroke(|row| row.map(|v| format!("\"{v:.3}\"").replace('.', ",")).join(","));
+    let (guess, recordings) = read(&[("a.csv", format!("t (s),p (kPa),x (mm),F (N)\n{rows}").into())]);
+    let recording = &recordings.unwrap_or_else(|e| panic!("{} {e}", guess.description))[0];
+    assert!((recording.stroke[19] - 3.8e-3).abs() < 1e-9 && recording.pressure[0] == 300e3);
+}

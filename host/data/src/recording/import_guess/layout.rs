@@ -181,7 +181,8 @@ fn dialect(lines: &[&[u8]]) -> Option<(Dialect, usize)> {
     let mut best: Option<(f64, Dialect, usize)> = None;
     for delimiter in *b"\t;,| " {
         for decimal_comma in [false, true] {
-            if delimiter == b',' && decimal_comma {
+            // Between commas, decimal commas are possible in quotation marks only.
+            if delimiter == b',' && decimal_comma && !body.iter().any(|l| l.contains(&b'"')) {
                 continue;
             }
             let dialect = Dialect { delimiter, comment: Some(b'#'), decimal_comma, skip_missing: false };

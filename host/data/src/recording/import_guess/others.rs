@@ -13,8 +13,15 @@ pub(super) struct Others<'a> {
     pub files: &'a [PathBuf],
     /// The sheet of workbooks.
     sheet: Option<&'a str>,
-    /// What the columns of each file hold.
-    seen: OnceCell<Vec<Vec<(String, Range)>>>,
+    seen: OnceCell<Vec<Seen>>,
+}
+
+/// What a file holds.
+struct Seen {
+    file: String,
+    headers: Vec<String>,
+    /// Of each column of numbers.
+    ranges: Vec<(String, Range)>,
 }
 
 /// Where the numbers of a column lie in one file.
@@ -43,18 +50,30 @@ impl<'a> Others<'a> {
         Self { files, sheet, seen: OnceCell::new() }
     }
 
-    /// The range of a column in each file that has it. Files that cannot be read are left out.
-    pub(super) fn ranges(&self, header: &str) -> Vec<Range> {
-        let of_file = |file: &PathBuf| -> Option<Vec<(String, Range)>> {
+    /// The files that can be read.
+    fn seen(&self) -> &[Seen] {
+        let of_file = |file: &PathBuf| -> Option<Seen> {
             // What a pipe gives once is left for the reader.
             let sample = file.is_file().then(|| Sample::read(file, self.sheet).ok())??;
             let numeric = sample.columns.iter().filter(|c| c.is_numeric());
-            Some(numeric.map(|c| (c.header.clone(), Range::of(c))).collect())
+            Some(Seen {
+                file: file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+                headers: sample.columns.iter().map(|c| c.header.clone()).collect(),
+                ranges: numeric.map(|c| (c.header.clone(), Range::of(c))).collect(),
+            })
         };
-        let seen = self.seen.get_or_init(|| self.files.iter().take(COMPARED).filter_map(of_file).collect());
-        let one =
-            |file: &Vec<(String, Range)>| file.iter().find(|(h, _)| h == header).map(|(_, range)| *range);
-        seen.iter().filter_map(one).collect()
+        self.seen.get_or_init(|| self.files.iter().take(COMPARED).filter_map(of_file).collect())
+    }
+
+    /// The range of a column in each file that has it. Files that cannot be read are left out.
+    pub(super) fn ranges(&self, header: &str) -> Vec<Range> {
+        let one = |file: &Seen| file.ranges.iter().find(|(h, _)| h == header).map(|(_, range)| *range);
+        self.seen().iter().filter_map(one).collect()
+    }
+
+    /// The first file whose columns have other names than these, or other places.
+    pub(super) fn with_other_columns(&self, headers: &[&str]) -> Option<&str> {
+        self.seen().iter().find(|file| file.headers != headers).map(|file| file.file.as_str())
     }
 
     /// Their names without folders.

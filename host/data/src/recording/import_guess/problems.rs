@@ -1,7 +1,8 @@
 //! What is wrong with a file for every reader: words among numbers, rows without numbers, recordings side by side.
 
+use super::others::Others;
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, roles};
+use super::{Guess, GuessedColumn, Source, roles};
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 
@@ -122,4 +123,17 @@ pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
         "no column says which run a row belongs to: make one file of each run, or remove the rows that are given twice".to_owned()
     };
     guess.unknown.push(format!("time does not increase at {}; {problem}", pluralise(at, "row")));
+}
+
+/// Files whose columns are in another order, where the description counts columns: nothing else would notice.
+pub(super) fn other_columns(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
+    if !guess.columns.iter().any(|c| matches!(c.source, Source::Number(_))) {
+        return;
+    }
+    let headers: Vec<&str> = sample.columns.iter().map(|c| c.header.as_str()).collect();
+    if let Some(file) = others.with_other_columns(&headers) {
+        guess.unknown.push(format!(
+            "the columns of {file} have other names or another order, and the description counts them: describe such files by themselves"
+        ));
+    }
 }

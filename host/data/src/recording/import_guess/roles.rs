@@ -64,6 +64,7 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     absolute::ask(sample, &mut guess);
     problems::incomplete_rows(sample, &mut guess);
     problems::side_by_side(sample, &mut guess);
+    problems::other_columns(sample, others, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
     guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
     what_is_missing(sample, &mut guess);
