@@ -113,7 +113,13 @@ const SPIKES: f64 = 1e-4;
 /// ```
 #[must_use]
 pub fn largest_force(campaign: &Campaign) -> f64 {
-    let forces = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();
+    largest_force_of(campaign.recordings.iter())
+}
+
+/// The same of some recordings.
+#[must_use]
+pub fn largest_force_of<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> f64 {
+    let forces = || recordings.clone().filter_map(|r| r.force.as_deref()).flatten().copied();
     // Only the upper end is sorted.
     let kept = 1 + (SPIKES * forces().count() as f64) as usize;
     let mut top: Vec<f64> = Vec::with_capacity(2 * kept);
