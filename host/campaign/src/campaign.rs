@@ -237,7 +237,6 @@ fn one_step(
     observer: &mut dyn Observer,
     chosen: &Chosen,
 ) -> Result<Option<Done>> {
-    let course = chosen.step.course(engine.places());
     let (top, blocked) = (engine.places().top, engine.places().blocked);
     let limits = Limits {
         pressure: top / TOP_SHARE,
@@ -247,6 +246,8 @@ fn one_step(
     let begin_s = actuation.clock();
     let mut spoiled = Vec::new();
     loop {
+        // What an attempt showed may change the next one.
+        let course = chosen.step.course(engine.places());
         let mut watch = Watch::new(limits, top, blocked);
         sink.begin(chosen.number, &chosen.step.name())?;
         let attempt = attempt(actuation, sink, observer, &course, &mut watch);
@@ -281,6 +282,8 @@ fn one_step(
                     reason,
                     end_s,
                 })?;
+                let longest = watch.rows().iter().map(|r| r.stroke).fold(0.0, f64::max);
+                engine.spoiled(&chosen.step, reason, longest);
                 observer.spoiled(&chosen.step, reason);
                 spoiled.push(reason);
                 if spoiled.len() as u32 > REPEATS {

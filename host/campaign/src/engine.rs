@@ -22,6 +22,7 @@ use crate::places::Places;
 pub use crate::purpose::Purpose;
 use crate::rig::Rig;
 use crate::step::{CheckKind, Step};
+use crate::watch::Spoiled;
 use crate::words;
 
 /// What to do next.
@@ -210,10 +211,13 @@ impl Engine {
         self.since_diagnosis += 1;
         let Some(recording) = recording else { return };
         match step {
-            Step::BlockedRamp | Step::Staircase { .. } => self.places.learn_ramp(&recording),
+            Step::BlockedRamp | Step::Staircase { part: 0.0, .. } => self.places.learn_ramp(&recording),
             Step::Survey { .. } => self.places.learn_survey(&recording),
             Step::Loops { .. } => self.places.learn_strokes(&recording),
             _ => {}
+        }
+        if self.places.by_hand && step.is_held_shortened() {
+            self.places.learn_held(&recording);
         }
         self.recordings.push(recording);
     }
@@ -221,6 +225,13 @@ impl Engine {
     /// Takes rows of an interrupted step: they are recordings like others, and the step is still to do.
     pub fn add_rows(&mut self, recording: Recording) {
         self.recordings.push(recording);
+    }
+
+    /// Takes that a recording was spoiled, which was made up to this stroke, m.
+    pub fn spoiled(&mut self, step: &Step, reason: Spoiled, stroke: f64) {
+        if reason == Spoiled::Slack && step.is_held_shortened() {
+            self.places.learn_slack(stroke);
+        }
     }
 
     /// Takes a check of the bench.

@@ -31,6 +31,10 @@ pub struct Places {
     pub free: f64,
     /// The fitted model.
     pub model: Option<Box<Muscle<f64>>>,
+    /// Held strokes at which the muscle pulled at the highest level, m, rising.
+    pulled_at: Vec<f64>,
+    /// Shortest held stroke at which it hung slack there, m; infinite while none is known.
+    slack_from: f64,
     /// Levels that were decided on: they stay, so that recordings at one level can be compared.
     decided: Option<Vec<f64>>,
 }
@@ -62,6 +66,8 @@ impl Places {
             deadband: 0.0,
             free: 0.0,
             model: None,
+            pulled_at: Vec::new(),
+            slack_from: f64::INFINITY,
             decided: None,
         })
     }
@@ -102,6 +108,49 @@ impl Places {
         }
         let highest = recording.force.iter().flatten().copied().fold(0.0, f64::max);
         self.blocked = self.blocked.max(highest);
+    }
+
+    /// Takes what a recording at a held stroke shows: the line from the blocked force through its force at the highest level meets zero
+    /// near the free stroke, and before it, because the force falls more slowly the shorter the muscle is.
+    pub fn learn_held(&mut self, recording: &Recording) {
+        let Some(force) = &recording.force else { return };
+        let stroke = recording.stroke.iter().copied().fold(0.0, f64::max);
+        let rows = recording.pressure.iter().zip(&recording.stroke).zip(force);
+        let at_top: Vec<f64> = rows
+            .filter(|((p, x), _)| **p > 0.95 * self.top && **x > 0.95 * stroke)
+            .map(|(_, f)| *f)
+            .collect();
+        let pull = at_top.iter().sum::<f64>() / at_top.len() as f64;
+        if !(stroke > 0.0 && pull >= self.free_force() && self.blocked > 0.0) {
+            return;
+        }
+        let before = self.pulled_at.last().copied().unwrap_or(0.0);
+        self.pulled_at.push(stroke);
+        self.pulled_at.sort_by(f64::total_cmp);
+        if stroke > before && pull < self.blocked {
+            let meets_zero = stroke / (1.0 - pull / self.blocked);
+            self.free = meets_zero.clamp(stroke, self.longest().max(stroke));
+        }
+    }
+
+    /// Takes that the muscle hung slack at this held stroke, m, even at the highest level.
+    pub fn learn_slack(&mut self, stroke: f64) {
+        if stroke > 0.0 {
+            self.slack_from = self.slack_from.min(stroke);
+            self.free = self.free.min(self.longest());
+        }
+    }
+
+    /// Longest stroke that the rig allows and at which the muscle may still pull, m.
+    fn longest(&self) -> f64 {
+        self.stroke_max.min(self.slack_from)
+    }
+
+    /// Whether the model knows the stroke: it saw strokes, or three held lengths.
+    fn model_knows_strokes(&self) -> bool {
+        const SAME: f64 = 1e-4;
+        let lengths = self.pulled_at.windows(2).filter(|w| w[1] - w[0] > SAME).count() + 1;
+        self.free > 0.0 && (!self.by_hand || self.pulled_at.is_empty() || lengths >= 2)
     }
 
     /// Takes the free stroke from a model where no stroke at the highest level was recorded.
@@ -169,15 +218,17 @@ impl Places {
     /// Stroke at which the muscle is free at a pressure, m; a little more where it is not known yet, as the force ends a stroke.
     #[must_use]
     pub fn free_stroke(&self, pressure: f64) -> f64 {
-        let limit = self.stroke_max;
-        if self.free > 0.0
+        let limit = self.longest();
+        if self.model_knows_strokes()
             && let Some(model) = &self.model
         {
             return (1.02 * pam_diagnose::protocol_simulation::free_stroke(model, pressure)).min(limit);
         }
         if self.free > 0.0 {
             let share = (pressure - self.deadband) / (self.top - self.deadband).max(1.0);
-            return (1.2 * self.free * share.clamp(0.05, 1.0)).min(limit);
+            // A stroke that is moved ends where the force does; a held one must not lie beyond it.
+            let beyond = if self.by_hand { 1.0 } else { 1.2 };
+            return (beyond * self.free * share.clamp(0.05, 1.0)).min(limit);
         }
         limit
     }

@@ -245,6 +245,12 @@ impl Step {
         builder.course
     }
 
+    /// Whether the length is held shorter than the rest length.
+    #[must_use]
+    pub fn is_held_shortened(&self) -> bool {
+        matches!(self, Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0)
+    }
+
     /// Bench time that it takes, s.
     #[must_use]
     pub fn seconds(&self, places: &Places) -> f64 {
@@ -259,10 +265,7 @@ impl Step {
 
     /// Strokes that the operator would have to set.
     fn positions(&self) -> u32 {
-        match self {
-            Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0 => 2,
-            _ => 0,
-        }
+        if self.is_held_shortened() { 2 } else { 0 }
     }
 }
 
@@ -293,7 +296,9 @@ impl Builder<'_> {
     }
 
     fn travel(&mut self, to: f64, times: f64) {
-        let until_force = (to > 0.0).then_some(self.places.free_force());
+        // An operator sets the stroke of a vented muscle: no force shows where it becomes free.
+        let ends_by_force = to > 0.0 && !self.places.by_hand;
+        let until_force = ends_by_force.then_some(self.places.free_force());
         self.course.record(Segment::Travel { to, speed: self.speed(times), until_force });
     }
 

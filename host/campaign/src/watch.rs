@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::actuation::Reading;
-use crate::criteria::{CLIPPED_ROWS, FOLLOWS, FOLLOWS_S, NOISY, OVER_PRESSURE, SLACK_ROWS};
+use crate::criteria::{CLIPPED_ROWS, FOLLOWS, FOLLOWS_S, FREE_FORCE, NOISY, OVER_PRESSURE, SLACK_ROWS};
 use crate::step::Step;
 
 /// Limits of muscle and rig.
@@ -48,7 +48,7 @@ impl fmt::Display for Spoiled {
             Self::NotSettled => "the pressure did not reach its command (supply closed, or valve saturated)",
             Self::Clipped => "a sensor stayed at the end of its range",
             Self::Frozen => "a sensor did not change although it must have",
-            Self::Slack => "the muscle was slack for most of it",
+            Self::Slack => "the muscle was slack",
             Self::Noisy => "the force is noisier than 2 % of the blocked force",
             Self::WrongSign => "the force falls as the pressure rises (sign of the load cell)",
             Self::WrongScale => {
@@ -133,6 +133,15 @@ impl Watch {
         &self.rows
     }
 
+    /// Whether the muscle did not pull at the held length, even at the highest level.
+    fn slack_at_the_top(&self) -> bool {
+        let held = 0.95 * self.rows.iter().map(|r| r.stroke).fold(0.0, f64::max);
+        let at_top = self.rows.iter().filter(|r| r.pressure > 0.95 * self.top && r.stroke > held);
+        let top: Vec<f64> = at_top.map(|r| r.force).collect();
+        let mean = top.iter().sum::<f64>() / top.len() as f64;
+        self.blocked > 0.0 && mean < FREE_FORCE * self.blocked
+    }
+
     /// Whether the step must be repeated, and why.
     #[must_use]
     pub fn judge(&self, step: &Step) -> Option<Spoiled> {
@@ -145,6 +154,9 @@ impl Watch {
         }
         let force: Vec<f64> = rows.iter().map(|r| r.force).collect();
         let stroke: Vec<f64> = rows.iter().map(|r| r.stroke).collect();
+        if step.is_held_shortened() && self.slack_at_the_top() {
+            return Some(Spoiled::Slack);
+        }
         if clipped(&force, self.blocked) {
             return Some(Spoiled::Clipped);
         }

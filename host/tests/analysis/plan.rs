@@ -120,6 +120,41 @@ fn a_plan_is_the_choice_of_the_campaign() {
     assert!(!from_files.unwrap().plan(2, 1e4).steps.is_empty());
 }
 
+/// Nobody knows the free stroke before the muscle has moved: a length at which it hangs slack is no recording, and the next is longer.
+#[test]
+fn lengths_set_by_hand_come_back_from_where_the_muscle_hangs_slack() {
+    use pam_campaign::engine::{Engine, Purpose};
+    use pam_campaign::{bench::VirtualBench, campaign::simulate, rig::Rig, step::Step, watch::Spoiled};
+    use pam_data::muscle_description::MuscleDescription;
+    let spec = BenchSpec::laboratory(presets::miniature(), 2);
+    let muscle = MuscleDescription::parse(&spec.muscle.description()).unwrap();
+    // 30 % of what the rig allows is more than this muscle's free stroke of about 3 mm.
+    let rig = Rig::parse("axis = 'prompt'\nstroke_max_mm = 12.0\n").unwrap();
+    let mut engine = Engine::new(muscle, rig, Purpose::Fit, 900.0).unwrap();
+    let course = simulate(&mut engine, &mut VirtualBench::new(&spec), None).unwrap();
+    let slack = course.iter().filter(|d| d.spoiled.contains(&Spoiled::Slack)).count();
+    assert!(slack >= 1, "the first length is too short: {course:#?}");
+    let held: Vec<(f64, f64)> = engine
+        .steps()
+        .iter()
+        .zip(engine.recordings())
+        .filter(|(step, _)| matches!(step, Step::Staircase { part, .. } if *part > 0.0))
+        .map(|(_, r)| {
+            let largest = r.force.iter().flatten().copied().fold(0.0, f64::max);
+            (r.stroke.iter().copied().fold(0.0, f64::max), largest)
+        })
+        .collect();
+    let blocked = engine.places().blocked;
+    assert!(held.len() >= 2, "{held:?}");
+    assert!(
+        held.iter().all(|(x, f)| *x > 2e-4 && *f > 0.05 * blocked),
+        "each length pulls: {held:?}, {blocked}"
+    );
+    let free = engine.places().free;
+    assert!((2e-3..4e-3).contains(&free), "free stroke {free} m");
+    assert!(engine.findings().is_some());
+}
+
 #[test]
 fn a_folder_with_other_files_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();

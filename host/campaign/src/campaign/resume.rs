@@ -23,7 +23,13 @@ pub(super) fn resume(
     for event in journal.events() {
         match event {
             Event::Chosen(c) => (chosen, spoiled) = (Some(c.clone()), Vec::new()),
-            Event::Spoiled { reason, .. } => spoiled.push(*reason),
+            Event::Spoiled { reason, file, .. } => {
+                spoiled.push(*reason);
+                if let (Some(chosen), Ok(recording)) = (&chosen, read(&journal.folder().join(file), muscle)) {
+                    let longest = recording.stroke.iter().copied().fold(0.0, f64::max);
+                    engine.spoiled(&chosen.step, *reason, longest);
+                }
+            }
             Event::Cut { file, rows, .. } => {
                 if *rows >= FEWEST_ROWS {
                     engine.add_rows(read(&journal.folder().join(file), muscle)?);

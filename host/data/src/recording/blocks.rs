@@ -42,6 +42,27 @@ impl Blocks {
         self.carry.splice(0..0, bytes.iter().copied());
     }
 
+    /// Appends this number of bytes, fewer at the end of the stream: in calls as large as the reader allows, where `read_to_end` begins
+    /// each block with small ones.
+    fn fill(&mut self, block: &mut Vec<u8>, want: usize) -> io::Result<usize> {
+        let begin = block.len();
+        block.resize(begin + want, 0);
+        let mut got = 0;
+        while got < want {
+            match self.reader.read(&mut block[begin + got..]) {
+                Ok(0) => break,
+                Ok(count) => got += count,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => {
+                    block.truncate(begin + got);
+                    return Err(e);
+                }
+            }
+        }
+        block.truncate(begin + got);
+        Ok(got)
+    }
+
     /// Fills `block` with the next lines; `false` at the end. The last line may lack its line end.
     pub(super) fn next(&mut self, block: &mut Vec<u8>) -> Result<bool, BlockError> {
         block.clear();
@@ -49,7 +70,7 @@ impl Blocks {
         let mut searched = 0;
         while !self.ended {
             let want = BLOCK.saturating_sub(block.len()).max(BLOCK / 4);
-            let got = (&mut self.reader).take(want as u64).read_to_end(block).map_err(BlockError::Io)?;
+            let got = self.fill(block, want).map_err(BlockError::Io)?;
             self.ended = got < want;
             if self.ended {
                 break;

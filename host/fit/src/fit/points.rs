@@ -58,6 +58,27 @@ impl Range {
         if range.low <= range.high { range } else { Self { low: 0.0, high: 0.0 } }
     }
 
+    /// Of numbers in slices, several at a time.
+    fn of_slices<'a>(slices: impl IntoIterator<Item = &'a [f64]>) -> Self {
+        const LANES: usize = 8;
+        let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        for slice in slices {
+            let (chunks, rest) = slice.as_chunks::<LANES>();
+            for chunk in chunks {
+                for lane in 0..LANES {
+                    low[lane] = low[lane].min(chunk[lane]);
+                    high[lane] = high[lane].max(chunk[lane]);
+                }
+            }
+            for (lane, v) in rest.iter().enumerate() {
+                low[lane] = low[lane].min(*v);
+                high[lane] = high[lane].max(*v);
+            }
+        }
+        let finite = low.into_iter().chain(high).filter(|v| v.is_finite());
+        Self::of(finite)
+    }
+
     /// `high − low`.
     #[must_use]
     pub fn span(&self) -> f64 {
@@ -171,9 +192,9 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
     let taken = |index: usize| campaign.recordings[index].force.is_some() && !screened.is_inconsistent(index);
     let with_force = || (0..campaign.recordings.len()).filter(|i| taken(*i)).map(|i| &campaign.recordings[i]);
     let rows: usize = with_force().map(Recording::len).sum();
-    let pressure = Range::of(with_force().flat_map(|r| r.pressure.iter().copied()));
-    let stroke = Range::of(with_force().flat_map(|r| r.stroke.iter().copied()));
-    let force = Range::of(with_force().flat_map(|r| r.force.iter().flatten().copied()));
+    let pressure = Range::of_slices(with_force().map(|r| r.pressure.as_slice()));
+    let stroke = Range::of_slices(with_force().map(|r| r.stroke.as_slice()));
+    let force = Range::of_slices(with_force().filter_map(|r| r.force.as_deref()));
     let most_rows = (rows / AIM).max(1) as u32;
     let noise = |of: fn(&Recording) -> &[f64]| with_force().map(|r| white_noise(of(r))).fold(0.0, f64::max);
     let stroke_noise = noise(|r| &r.stroke);
@@ -327,6 +348,20 @@ mod tests {
             ..Recording::default()
         };
         (Campaign::new(vec![recording]), vec![Motion { direction, ..Motion::default() }])
+    }
+
+    #[test]
+    fn ranges_of_slices_are_those_of_their_numbers() {
+        for lengths in [vec![], vec![0], vec![1], vec![7, 8, 9], vec![3, 40, 0, 17]] {
+            let value = |i: usize| ((i * 7919 + 3) % 101) as f64 - 60.0;
+            let slices: Vec<Vec<f64>> = lengths
+                .iter()
+                .enumerate()
+                .map(|(k, n)| (0..*n).map(|i| value(100 * k + i)).collect())
+                .collect();
+            let expected = Range::of(slices.iter().flatten().copied());
+            assert_eq!(Range::of_slices(slices.iter().map(Vec::as_slice)), expected, "{lengths:?}");
+        }
     }
 
     #[test]
