@@ -7,7 +7,7 @@ use pam_data::error::Error;
 use pam_data::recording::import_guess::{Guess, guess_among};
 use pam_data::recording::{Import, Reader, Recording};
 
-/// Reads files by what is guessed from all of them.
+/// Reads files by the description that all of them give.
 fn read(files: &[(&str, Vec<u8>)]) -> (Guess, Result<Vec<Recording>, Error>) {
     let folder = tempfile::tempdir().unwrap();
     let paths: Vec<_> = files.iter().map(|(name, _)| folder.path().join(name)).collect();

@@ -101,7 +101,7 @@ impl Problem {
         if self.pressures.held { 0 } else { ((pressure - range.low) / range.span().max(1.0) * 100.0) as u32 }
     }
 
-    /// The median ratio of the force to what the braid as described would make of the pressure (`P g`) by itself, over points above half
+    /// The median ratio of the force to what the braid as described would make of the pressure (`P g`), over points above half
     /// of the largest force. `None` where there are none.
     pub(super) fn share_of_braid(&self) -> Option<f64> {
         let described = self.nominal.build().ok()?;

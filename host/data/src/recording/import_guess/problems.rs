@@ -19,7 +19,7 @@ pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
         let advice = if has_thousands(cell) {
             "write numbers without separators of thousands"
         } else {
-            "remove what is no number, or write all decimals with the same sign"
+            "remove these cells, or write all decimals with the same sign"
         };
         guess.unknown.push(format!(
             "{} looks like {}, but {} of {} cells are no numbers, such as `{}`: {advice}",
