@@ -78,6 +78,7 @@ pub fn in_text(text: &str) -> Option<f64> {
 /// assert_eq!(time_stamp("2026-11-21T01:30:00+01:00"), Some(1_795_219_200.0 + 1800.0));
 /// assert_eq!(time_stamp("21.11.2026 01:30:00,5"), Some(1_795_219_200.0 + 5400.5));
 /// assert_eq!(time_stamp("13:30:00.5"), Some(48_600.5));
+/// assert_eq!(time_stamp("1:30:00.5 PM"), Some(48_600.5));
 /// assert_eq!(time_stamp("11/21/2026 13:30"), None);
 /// ```
 #[must_use]
@@ -85,18 +86,22 @@ pub fn time_stamp(text: &str) -> Option<f64> {
     let text = text.trim().as_bytes();
     let iso = |text| {
         let (year, rest) = number(text, 4)?;
-        let (month, rest) = number(rest.strip_prefix(b"-")?, 2)?;
-        let (day, rest) = number(rest.strip_prefix(b"-")?, 2)?;
+        let (month, rest) = short(rest.strip_prefix(b"-").or_else(|| rest.strip_prefix(b"/"))?)?;
+        let (day, rest) = short(rest.strip_prefix(b"-").or_else(|| rest.strip_prefix(b"/"))?)?;
         Some((year, month, day, rest))
     };
     let german = |text| {
-        let (day, rest) = number(text, 2)?;
-        let (month, rest) = number(rest.strip_prefix(b".")?, 2)?;
+        let (day, rest) = short(text)?;
+        let (month, rest) = short(rest.strip_prefix(b".")?)?;
         let (year, rest) = number(rest.strip_prefix(b".")?, 4)?;
         Some((year, month, day, rest))
     };
     let Some((year, month, day, rest)) = iso(text).or_else(|| german(text)) else {
-        return time_with_parts(text).filter(|(_, rest)| rest.is_empty()).map(|(seconds, _)| seconds);
+        // `05:30` alone may be minutes and seconds.
+        let whole = text.iter().filter(|b| **b == b':').count() == 2;
+        return time_with_parts(text)
+            .filter(|(_, rest)| whole && rest.is_empty())
+            .map(|(seconds, _)| seconds);
     };
     let real = (1970..2100).contains(&year)
         && (1..=12).contains(&month)
@@ -107,9 +112,26 @@ pub fn time_stamp(text: &str) -> Option<f64> {
     real.then(|| seconds_since_1970(year, month, day) as f64 + seconds - offset)
 }
 
-/// A time of day with parts of a second, s, and what follows it.
+/// A time of day, s, and what follows it, also with `AM` or `PM`.
 fn time_with_parts(bytes: &[u8]) -> Option<(f64, &[u8])> {
-    let (hour, rest) = number(bytes, 2)?;
+    /// Half a day, s.
+    const HALF: f64 = 43_200.0;
+    let (seconds, rest) = time_of_24_hours(bytes)?;
+    let mark =
+        rest.trim_ascii_start().get(..2).map(|m| [m[0].to_ascii_lowercase(), m[1].to_ascii_lowercase()]);
+    let late = match mark.as_ref() {
+        Some(b"am") => 0.0,
+        Some(b"pm") => HALF,
+        _ => return Some((seconds, rest)),
+    };
+    // Half an hour past noon is written as 12:30 PM.
+    let of_twelve = (3600.0..HALF + 3600.0).contains(&seconds);
+    of_twelve.then_some((seconds % HALF + late, &rest.trim_ascii_start()[2..]))
+}
+
+/// A time of day with parts of a second, s, and what follows it.
+fn time_of_24_hours(bytes: &[u8]) -> Option<(f64, &[u8])> {
+    let (hour, rest) = short(bytes)?;
     let (minute, rest) = number(rest.strip_prefix(b":")?, 2)?;
     let Some(rest) = rest.strip_prefix(b":") else {
         return (hour < 24 && minute < 60).then_some(((3600 * hour + 60 * minute) as f64, rest));
@@ -140,6 +162,11 @@ fn offset_of_zone(bytes: &[u8]) -> Option<f64> {
     let (hours, rest) = number(rest, 2)?;
     let (minutes, rest) = if rest.is_empty() { (0, rest) } else { number(after(rest, b":"), 2)? };
     (hours < 15 && minutes < 60 && rest.is_empty()).then_some(sign * (3600 * hours + 60 * minutes) as f64)
+}
+
+/// A number of one or two digits at the beginning, and what follows.
+fn short(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    number(bytes, 2).or_else(|| number(bytes, 1))
 }
 
 /// A number of `n` digits at the beginning, and what follows.
@@ -248,6 +275,28 @@ fn iso_8601(seconds: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn time_stamps_of_loggers_are_read_and_ambiguous_ones_are_not() {
+        let noon = 1_795_219_200.0 + 43_200.0;
+        let same = [
+            "2026-11-21 12:00:01.5",
+            "2026/11/21 12:00:01.5",
+            "2026/11/21 12:00:01.5 PM",
+            "21.11.2026 12:00:01,5",
+        ];
+        for text in same {
+            assert_eq!(time_stamp(text), Some(noon + 1.5), "{text}");
+        }
+        assert_eq!(time_stamp("1.2.2026 9:05:07"), time_stamp("01.02.2026 09:05:07"));
+        assert_eq!((time_stamp("9:05:07"), time_stamp("12:00:01 am")), (Some(32_707.0), Some(1.0)));
+        // Minutes and seconds, a month before the day, the thirteenth hour of twelve.
+        for text in
+            ["05:30", "5:30.25", "11/21/2026 13:30:00", "13:30:00 PM", "0:30:00 AM", "9:5:7", "9:05:07 XM"]
+        {
+            assert_eq!(time_stamp(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn dates_are_those_of_the_calendar() {

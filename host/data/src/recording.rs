@@ -40,7 +40,7 @@ mod unit_check;
 #[cfg(feature = "excel")]
 mod workbook;
 
-pub use campaign::{Campaign, Clock, largest_force};
+pub use campaign::{Campaign, Clock, largest_force, largest_force_of};
 pub use column_table::Column as TableColumn;
 pub use columns::{HELD, Recording};
 pub use follow::{Follower, UNKNOWN_PAUSE};

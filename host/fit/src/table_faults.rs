@@ -17,6 +17,8 @@ const CREEP: f64 = 0.03;
 /// A mean error above this, percent of blocked force, is no description of the recordings: a wrong unit, sign or dimension is more likely
 /// than physics that the model lacks.
 pub const WORST_MEAN_ERROR: f64 = 10.0;
+/// A force that rises by this share over the tested contraction is none that friction, creep, or a mounting error of a millimetre feigns.
+const RISE: f64 = 0.1;
 /// The inverse may fail at this share of the tested places (pressure and contraction) at most: the corners of the range.
 const LOST_PLACES: f64 = 0.05;
 /// Places over the ranges of pressure and contraction at which the inverse is examined.
@@ -40,7 +42,13 @@ pub fn table_faults(
     uncertainty: Option<&Uncertainty>,
     quality: &FitQuality,
 ) -> Vec<String> {
-    let faults = [deadband(table, uncertainty), friction(table, uncertainty), error(quality), inverse(table)];
+    let faults = [
+        deadband(table, uncertainty),
+        friction(table, uncertainty),
+        error(quality),
+        shortening(table),
+        inverse(table),
+    ];
     faults.into_iter().flatten().collect()
 }
 
@@ -97,6 +105,25 @@ fn error(quality: &FitQuality) -> Option<String> {
             "the table does not describe its recordings: the mean error is {:.0} % of the blocked force (bound: {WORST_MEAN_ERROR:.0} %); \
              check units, signs and the dimensions of the muscle",
             quality.mean_error_percent
+        )
+    })
+}
+
+/// A force that rises as the muscle shortens: the fibres of every braid then pull at a flatter angle, and the force falls.
+fn shortening(table: &MuscleTable) -> Option<String> {
+    let muscle = Muscle::<f64>::build(table).ok()?;
+    let (t, l0) = (&table.tested, f64::from(table.geometry.rest_length.metres()));
+    let at = |contraction: f32| {
+        let held = muscle.at_stroke(Length::from_metres(f64::from(contraction) * l0));
+        muscle.parts(&held, Pressure::from_pascals(f64::from(t.pressure_high.pascals()))).quasi()
+    };
+    let (long, short) = (at(t.contraction_low), at(t.contraction_high));
+    (short > 0.0 && short - long > RISE * short).then(|| {
+        format!(
+            "the force rises from {long:.0} to {short:.0} N at {:.0} kPa as the muscle shortens by {:.1} % of its length: check the sign of \
+             the displacement (positive = \"extension\" in an import description inverts it)",
+            t.pressure_high.pascals() / 1e3,
+            100.0 * (t.contraction_high - t.contraction_low)
         )
     })
 }
@@ -161,6 +188,17 @@ mod tests {
             table_faults(&table, None, &quality).len()
         };
         assert_eq!([of(3.0), of(11.0), of(f64::NAN)], [0, 1, 1]);
+    }
+
+    #[test]
+    fn a_force_that_rises_as_the_muscle_shortens_is_a_fault() {
+        let mut table = model_core::table::example();
+        assert!(faults(&table, None).is_empty());
+        // Of a displacement with the other sign, the tested range lies on the other side of the rest length, and elasticity makes up for it.
+        (table.tested.contraction_low, table.tested.contraction_high) = (-0.05, 0.0);
+        table.elastic[1].iter_mut().for_each(|e| *e += 4e7);
+        let found = faults(&table, None);
+        assert!(found.iter().any(|f| f.contains("as the muscle shortens")), "{found:?}");
     }
 
     #[test]

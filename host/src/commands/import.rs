@@ -165,7 +165,10 @@ fn to_text(guess: &Guess, recordings: &[&Recording], usual: bool) -> String {
     }
     for (what, pattern) in &guess.patterns {
         let place = if *what == "file_name" { "the file's name" } else { "the lines above the table" };
-        text += &format!("  {:<17} {place}: {pattern}\n", "pressure");
+        // The first group of a pattern is called after the quantity and its unit.
+        let group =
+            pattern.split_once("(?<").map_or("", |(_, rest)| rest.split(['_', '>']).next().unwrap_or(""));
+        text += &format!("  {group:<17} {place}: {pattern}\n");
     }
     if !guess.unused.is_empty() {
         text += &format!("not used: {}\n", guess.unused.join(", "));

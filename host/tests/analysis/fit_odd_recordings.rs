@@ -274,6 +274,20 @@ fn a_campaign_in_another_unit_throughout_is_told_by_how_much() {
     assert!((30.0..110.0).contains(&times) && advice.contains("what this braid makes"), "{advice}");
 }
 
+/// A recording in grams is named and left out, and the scale of the errors is that of the others.
+#[test]
+fn a_recording_in_grams_is_left_out_and_sets_no_scale() {
+    let mut noise = Noise::new(13, 0.0);
+    let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
+    let summary =
+        |all: &[_]| fit(&Campaign::new(all.to_vec()), &description(), &Options::default()).unwrap().summary;
+    let largest = summary(&recordings).largest_force_N;
+    recordings[2].force.iter_mut().flatten().for_each(|f| *f *= 1000.0 / 9.806_65);
+    let odd = summary(&recordings);
+    assert!(odd.warnings.iter().any(|w| w.contains("the ratio of N to gf")), "{:?}", odd.warnings);
+    assert!((odd.largest_force_N / largest - 1.0).abs() < 0.05, "{} {largest}", odd.largest_force_N);
+}
+
 /// A motion that no braid permits is reported with the recording and the time.
 #[test]
 fn a_stroke_of_the_other_sign_is_told_with_its_place() {

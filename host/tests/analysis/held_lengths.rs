@@ -53,6 +53,19 @@ fn described_dimensions_stay_where_others_describe_the_force_no_better() {
     }
 }
 
+/// Fitted dimensions can make up for a factor of the force; then only the described ones show it.
+#[test]
+fn a_force_in_another_unit_is_told_though_fitted_dimensions_describe_it() {
+    let spec = presets::contractile();
+    let told = |per_newton: f64| {
+        let mut recordings = staircases(&spec, 1).recordings;
+        recordings.iter_mut().flat_map(|r| r.force.iter_mut().flatten()).for_each(|f| *f *= per_newton);
+        let found = fit(&Campaign::new(recordings), &description(&spec), &Options::default()).unwrap();
+        found.summary.warnings.iter().any(|w| w.contains("what the described braid makes"))
+    };
+    assert!(told(1.0 / 9.806_65) && !told(1.0));
+}
+
 #[test]
 fn mountings_of_equal_length_are_kept_apart_by_their_labels() {
     let spec = presets::contractile();

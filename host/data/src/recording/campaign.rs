@@ -113,7 +113,13 @@ const SPIKES: f64 = 1e-4;
 /// ```
 #[must_use]
 pub fn largest_force(campaign: &Campaign) -> f64 {
-    let forces = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();
+    largest_force_of(campaign.recordings.iter())
+}
+
+/// The same of some recordings.
+#[must_use]
+pub fn largest_force_of<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> f64 {
+    let forces = || recordings.clone().filter_map(|r| r.force.as_deref()).flatten().copied();
     // Only the upper end is sorted.
     let kept = 1 + (SPIKES * forces().count() as f64) as usize;
     let mut top: Vec<f64> = Vec::with_capacity(2 * kept);
@@ -162,15 +168,18 @@ fn typical_interval(time: &[f64]) -> Option<f64> {
 }
 
 /// A warning about a recording whose time has another unit than that of the others: its sample interval is a thousand times theirs, or a
-/// thousandth, and the stroke per row is the same.
+/// thousandth, and the stroke per row is the same; where lengths are held, the change of pressure per row.
 fn other_clock(recordings: &[Recording]) -> Option<String> {
     if recordings.len() < 3 {
         return None;
     }
+    let held = recordings.iter().all(|r| r.held_stroke().is_some());
+    let what = if held { "change of pressure" } else { "stroke" };
     let a_row = |r: &Recording| {
         let steps = r.len().saturating_sub(1).max(1) as f64;
-        let way: f64 = r.stroke.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
-        (r.duration() / steps, way / steps)
+        let way = |of: &[f64]| of.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>() / steps;
+        let moved = if held { way(&r.pressure) } else { way(&r.stroke) };
+        (r.duration() / steps, moved)
     };
     let rows: Vec<(f64, f64)> = recordings.iter().map(a_row).collect();
     let middle = |of: &dyn Fn(&(f64, f64)) -> f64| median(&mut rows.iter().map(of).collect::<Vec<_>>());
@@ -181,7 +190,7 @@ fn other_clock(recordings: &[Recording]) -> Option<String> {
     };
     let i = rows.iter().position(odd)?;
     Some(format!(
-        "the sample interval of `{}` is {:.4} s, that of the others {:.4} s, with the same stroke per row: its time seems to have another \
+        "the sample interval of `{}` is {:.4} s, that of the others {:.4} s, with the same {what} per row: its time seems to have another \
          unit; put the logged unit into the column's name",
         recordings[i].name, rows[i].0, interval
     ))
@@ -221,6 +230,23 @@ mod tests {
         assert_eq!(twice, "`a` is given twice, and counts twice");
         let copied = warned(vec![from("a", 0.0, 60.0), from("copy", 0.0, 60.0)]);
         assert_eq!(copied, "`a` and `copy` hold the same rows, which count twice");
+    }
+
+    #[test]
+    fn a_clock_in_another_unit_is_reported_at_held_lengths_too() {
+        let staircase = |unit: f64| Recording {
+            time: (0..60).map(|i| unit * 0.1 * f64::from(i)).collect(),
+            pressure: (0..60).map(|i| 1e4 * f64::from(30 - (i - 30_i32).abs())).collect(),
+            stroke: vec![5e-3; 60],
+            ..Recording::default()
+        };
+        let warned = |of: [f64; 3]| Campaign::new(of.map(staircase).to_vec()).warnings.join("; ");
+        assert!(
+            warned([1.0, 1e3, 1.0]).contains("same change of pressure per row"),
+            "{}",
+            warned([1.0, 1e3, 1.0])
+        );
+        assert!(!warned([1.0, 2.0, 1.0]).contains("another unit"));
     }
 
     #[test]

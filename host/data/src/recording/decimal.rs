@@ -143,6 +143,19 @@ fn run(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
     Some((eights, count))
 }
 
+/// A number that a pattern catches from a file's name or from a line above the table. Its decimal sign may be a comma, or, between digits,
+/// one that names of files may contain: `2p05`, `2_05`, `2-05`. A comma that may separate thousands, as in `1,000`, is none.
+pub(super) fn caught(text: &str) -> Option<f64> {
+    let sign = text.char_indices().find(|(_, c)| ",p_-".contains(*c));
+    let (Some((at, sign)), true) = (sign, text.starts_with(|c: char| c.is_ascii_digit())) else {
+        return text.parse().ok().filter(|v: &f64| v.is_finite());
+    };
+    let (whole, fraction) = (&text[..at], &text[at + 1..]);
+    let digits = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    let thousands = sign == ',' && fraction.len() == 3 && whole.len() <= 3 && whole != "0";
+    (digits(whole) && digits(fraction) && !thousands).then(|| format!("{whole}.{fraction}").parse().ok())?
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;

@@ -21,8 +21,10 @@ mod absolute;
 mod layout;
 mod lookup;
 mod named_length;
+mod named_pressure;
 mod names;
 mod others;
+mod problems;
 mod roles;
 mod runs;
 mod sample;
@@ -160,7 +162,7 @@ pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
 /// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
 pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let mut guess = roles::assign(path, &sample, &Others { files: others, sheet });
+    let mut guess = roles::assign(path, &sample, &Others::of(others, sheet));
     guess.description = text::description(&guess);
     Ok(guess)
 }

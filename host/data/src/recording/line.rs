@@ -1,5 +1,7 @@
 //! One line of text, cell by cell.
 
+use std::borrow::Cow;
+
 use super::cells::Dialect;
 use super::decimal;
 
@@ -10,6 +12,11 @@ pub(super) fn is_blank(byte: u8) -> bool {
 /// A line without its carriage return.
 pub(super) fn trim_end(line: &[u8]) -> &[u8] {
     line.strip_suffix(b"\r").unwrap_or(line)
+}
+
+/// Bytes as text: UTF-8, and Latin-1 where they are none, as older programs of Windows write `µ`, `°`, and letters with accents.
+pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
+    std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().copied().map(char::from).collect(), Cow::Borrowed)
 }
 
 /// A place in a line, cell by cell; `at` is `None` behind the last cell.
@@ -101,7 +108,7 @@ impl<'a> Cells<'a> {
     }
 
     /// The next cell as text; an error where a quote does not end.
-    pub(super) fn text(&mut self) -> Result<std::borrow::Cow<'a, str>, ()> {
+    pub(super) fn text(&mut self) -> Result<Cow<'a, str>, ()> {
         let Some(at) = self.at else { return Ok("".into()) };
         let start = self.blanks(at);
         if self.line.get(start) == Some(&b'"') {
@@ -115,10 +122,10 @@ impl<'a> Cells<'a> {
         };
         let cell = &rest[..end.unwrap_or(rest.len())];
         self.at = self.end_of_blank_run(end.map(|e| start + e + 1));
-        Ok(String::from_utf8_lossy(cell))
+        Ok(decode(cell))
     }
 
-    fn quoted(&mut self, start: usize) -> Result<std::borrow::Cow<'a, str>, ()> {
+    fn quoted(&mut self, start: usize) -> Result<Cow<'a, str>, ()> {
         let mut text = Vec::new();
         let mut at = start;
         loop {
@@ -130,7 +137,7 @@ impl<'a> Cells<'a> {
                 continue;
             }
             self.at = self.end_of_blank_run(self.after(end + 1).ok_or(())?);
-            return Ok(String::from_utf8_lossy(&text).into_owned().into());
+            return Ok(decode(&text).into_owned().into());
         }
     }
 

@@ -155,8 +155,10 @@ pub(super) fn usual_name(header: &str) -> String {
         None if header.eq_ignore_ascii_case(Quantity::PressureCommand.name()) => (header, ""),
         None => header.rsplit_once('_').unwrap_or((header, "")),
     };
+    // Of temperatures only: `µm` is no metre, whatever became of its first sign.
     let degrees = unit.trim_start_matches(['°', 'º', '\u{fffd}']);
-    let unit = degrees.strip_prefix("deg").map_or(degrees, str::trim_start);
+    let degrees = degrees.strip_prefix("deg").map_or(degrees, str::trim_start);
+    let unit = if ["C", "K"].contains(&degrees) { degrees } else { unit };
     let base = base.to_lowercase().replace(' ', "_");
     if unit.is_empty() || unit == "-" { base } else { format!("{base}_{unit}") }
 }
@@ -168,6 +170,7 @@ pub(super) fn usual_name(header: &str) -> String {
 /// assert!(matches!(named("pressure_command_kPa"), Named::Known(Quantity::PressureCommand, u) if u.scale == 1e3));
 /// assert_eq!(named("Force [lbf]"), named("force_lbf"));
 /// assert_eq!(named("Temperature [°C]"), named("temperature_C"));
+/// assert_eq!(named("Time [\u{fffd}s]"), Named::UnknownUnit(Quantity::Time));
 /// assert_eq!(named("pressure_mmHg"), Named::UnknownUnit(Quantity::Pressure));
 /// assert_eq!(named("pressure_sd_kPa"), Named::Other);
 /// assert_eq!(named("t_s"), named("time_s"));

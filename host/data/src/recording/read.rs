@@ -14,6 +14,7 @@ use super::columns::Recording;
 use super::container::{self, Container};
 use super::header::Header;
 use super::import::{Decimal, Import, Missing, Value};
+use super::line::decode;
 use super::lookup::read_lookup;
 use super::mcap::Needed;
 use super::quantity::{Named, Quantity, named};
@@ -226,7 +227,7 @@ impl<'a> Reader<'a> {
         let rest = &text[header.bytes..];
         let average = header.average_line(rest);
         blocks.put_back(rest);
-        let preamble = String::from_utf8_lossy(&text[..header.preamble]);
+        let preamble = decode(&text[..header.preamble]);
         let layout = self.layout(path, &header.names, &description, &preamble).map_err(|e| {
             let below = if self.import.is_none() { header_below(text, &header) } else { None };
             match below {

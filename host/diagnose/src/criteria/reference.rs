@@ -153,6 +153,8 @@ pam_data::criteria! {
     UNSEEN_LEAST: f64 = 0.1, "unseen_least", "1", Convention("as FURTHER_SHARE of the forward selection");
     /// The same from which on the names explain the difference; below it they explain a part.
     UNSEEN_EXPLAINED: f64 = 0.5, "unseen_explained", "1", Convention("the larger part");
+    /// The residual of the names, or a difference that mounting anew excuses, stands out above this many times what untouched recordings differ by.
+    STANDS_OUT: f64 = 2.0, "stands_out", "1", Convention("two standard deviations");
     /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
     LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;
     /// Strokes: bins over the middle of the stroke.

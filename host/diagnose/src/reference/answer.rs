@@ -100,6 +100,8 @@ pub enum Remark {
     OtherActuator,
     /// Mounted anew, and one length only.
     OneLengthMountedAnew,
+    /// Nothing is named, since a mounting anew to a millimetre makes a difference of this size.
+    WithinMounting,
     /// A length that the reference does not have, m: its force there is interpolated, with this error, N.
     Interpolated {
         /// Its stroke, m.

@@ -9,7 +9,7 @@ use super::answer::{
 use super::cells::rms_after;
 use super::criteria::{
     CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
-    SLOPE_ERROR, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
+    SLOPE_ERROR, STANDS_OUT, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
 use super::held_out;
 use super::isometric::Analysis;
@@ -37,6 +37,9 @@ pub(super) fn staircases(analysis: &Analysis, options: &Options) -> ChangeReport
     let not = incomparable(analysis);
     if not.iter().any(|n| matches!(n, NotComparable::OneLength)) && analysis.runs.remounted {
         remarks.push(Remark::OneLengthMountedAnew);
+    }
+    if verdict == Verdict::Consistent && analysis.runs.remounted && unseen.before > STANDS_OUT * noise {
+        remarks.push(Remark::WithinMounting);
     }
     let before: Vec<usize> = analysis.runs.side(false).map(|r| r.mounting).collect();
     let measured = before.iter().any(|m| before.iter().filter(|o| *o == m).count() > 1);

@@ -4,7 +4,7 @@ use super::answer::{
     ChangeReport, Changed, Considered, Curve, HeldOut, Place, Probability, Reference, Remark, Repeatability,
     Since, Split, Verdict, WhyNot, size,
 };
-use super::criteria::{NAMED, STROKE_PRIOR_NONE, UNSEEN_EXPLAINED};
+use super::criteria::{NAMED, STANDS_OUT, STROKE_PRIOR_NONE, UNSEEN_EXPLAINED};
 use super::held_out::Unseen;
 use super::report::{Options, left, prior};
 use super::shapes::{Change, Class};
@@ -20,16 +20,16 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
     let weighed = stroked::weigh(compared, none)?;
     let named = stroked::named(&weighed);
     let (before, after) = stroked::unseen(compared, &named);
+    let n = compared.keys.len();
+    let noise = (compared.covariance.trace() / (2 * n) as f64).sqrt();
     let verdict = if named.is_empty() && weighed.none() < 0.1 {
         Verdict::Unexplained
     } else if named.is_empty() {
         Verdict::Consistent
     } else {
-        let share = Unseen { before, after, held: true }.share();
-        if share >= UNSEEN_EXPLAINED { Verdict::Explained } else { Verdict::PartlyExplained }
+        let larger_part = Unseen { before, after, held: true }.share() >= UNSEEN_EXPLAINED;
+        if larger_part && after <= STANDS_OUT * noise { Verdict::Explained } else { Verdict::PartlyExplained }
     };
-    let n = compared.keys.len();
-    let noise = (compared.covariance.trace() / (2 * n) as f64).sqrt();
     let unseen = Unseen { before, after, held: true };
     let places = if verdict == Verdict::Consistent { Vec::new() } else { stroke_places(compared) };
     let mut probabilities: Vec<Probability> = stroked::ASKED

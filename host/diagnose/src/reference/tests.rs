@@ -114,6 +114,10 @@ fn a_shift_of_the_clamp_is_no_change_where_the_actuator_was_mounted_anew() {
     let anew = ask(&|_, _, _, s| (0.0, 0.7e-3 * s), Mounted::Anew);
     assert!(anew.missing.is_empty(), "{:?}", anew.probabilities);
     assert!(anew.reference.mounted_anew);
+    // The answer explains a difference of this size, and names the option that makes a change of it.
+    assert!(anew.misfit_rms_N > 2.0 * anew.noise_N, "{} {}", anew.misfit_rms_N, anew.noise_N);
+    assert!(anew.remarks.contains(&Remark::WithinMounting), "{:?}", anew.remarks);
+    assert!(!ask(&untouched, Mounted::Anew).remarks.contains(&Remark::WithinMounting));
 }
 
 #[test]

@@ -101,12 +101,13 @@ impl Problem {
         if self.pressures.held { 0 } else { ((pressure - range.low) / range.span().max(1.0) * 100.0) as u32 }
     }
 
-    /// The median ratio of the force to what the braid alone would make of the pressure (`P g`), over points above half of the
-    /// largest force. `None` where there are none.
+    /// The median ratio of the force to what the braid as described would make of the pressure (`P g`), over points above half
+    /// of the largest force. `None` where there are none.
     pub(super) fn share_of_braid(&self) -> Option<f64> {
+        let described = self.nominal.build().ok()?;
         let shares =
             self.points.list.iter().filter(|p| p.force > 0.5 * self.points.force.high).filter_map(|p| {
-                let of_braid = p.pressure * columns(&self.braid, p.stroke).area;
+                let of_braid = p.pressure * columns(&described, p.stroke).area;
                 (of_braid > 0.0).then(|| p.force / of_braid)
             });
         let mut shares: Vec<f64> = shares.collect();

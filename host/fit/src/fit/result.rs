@@ -120,7 +120,7 @@ impl Fit {
 }
 
 /// The largest force of a muscle as a share of what its braid alone would make of the pressure; deadband and elasticity reduce it.
-const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
+pub(super) const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
 
 /// The table's numbers from the solution, checked.
 ///

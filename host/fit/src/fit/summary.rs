@@ -1,11 +1,13 @@
 //! The figures of a fit, as text and as JSON.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
 use crate::table_file::FitQuality;
 use model_core::table::MuscleTable;
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::{Campaign, largest_force};
+use pam_data::recording::{Campaign, largest_force_of};
 
 use super::by_recording::{self, RecordingResidual, recording_table};
 use super::dimensions::Adjusted;
@@ -272,6 +274,9 @@ pub(super) fn summarise(
     let known: Vec<f64> = left_out.iter().copied().flatten().collect();
     let pressures = at_levels(solution, results);
     let deadband_std = table_root(solution, &uncertain.root, levels).std(0);
+    // A recording in another unit was left out.
+    let indices: BTreeSet<u32> = problem.points.list.iter().map(|p| p.recording).collect();
+    let used = indices.iter().filter_map(|i| campaign.recordings.get(*i as usize));
     Summary {
         schema: "pam-fit/1",
         muscle: muscle.name.clone(),
@@ -297,7 +302,7 @@ pub(super) fn summarise(
         adjusted: problem.adjusted.clone(),
         warnings: super::warnings::warnings(solution, all.mean, left_out),
         recordings: by_recording::of_fit(solution, campaign, residuals),
-        largest_force_N: largest_force(campaign),
+        largest_force_N: largest_force_of(used),
         faults: Vec::new(),
     }
 }

@@ -1,5 +1,6 @@
 //! Warnings about a fit: what was seen, what it means, what to do.
 
+use super::result::SHARE_OF_BRAID;
 use super::screen::PointUse;
 use super::solution::Solution;
 use super::weights::scatter;
@@ -46,6 +47,13 @@ fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
              import description",
             force.low,
             force.high.max(0.0)
+        ));
+    }
+    let (least, most) = SHARE_OF_BRAID;
+    if let Some(share) = solution.problem.share_of_braid().filter(|s| !(least..most).contains(s)) {
+        out.push(format!(
+            "the force is {share:.2} times what the described braid makes of the recorded pressure; {least} to {most} is usual: check the \
+             units of force and pressure, and the muscle's dimensions"
         ));
     }
     if mean_error > NO_MUSCLE {

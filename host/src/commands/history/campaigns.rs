@@ -10,9 +10,12 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_diagnose::timeline::Visit;
 
-/// Endings of files that are taken from a folder; others are notes, tables and pictures.
-const ENDINGS: [&str; 12] =
-    ["csv", "tsv", "txt", "dat", "gz", "zst", "mat", "h5", "hdf5", "parquet", "mcap", "log"];
+/// Endings of files that are taken from a folder; others are notes, tables and pictures. Of files that differ in the ending only, the first
+/// counts: programs save a recording in several formats.
+const ENDINGS: [&str; 16] = [
+    "csv", "tsv", "txt", "dat", "gz", "zst", "mat", "h5", "hdf5", "parquet", "mcap", "log", "tdms", "lvm",
+    "xlsx", "ods",
+];
 /// s of a day: recordings of one day are one campaign where the names say no more.
 const DAY: f64 = 86_400.0;
 
@@ -52,16 +55,21 @@ fn name_of(path: &Path) -> String {
 
 fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::unreadable(folder, &e))?;
-    let taken = |p: &PathBuf| {
-        let ending = p.extension().map(|e| e.to_string_lossy().to_lowercase());
-        p.is_file() && ending.is_some_and(|e| ENDINGS.contains(&e.as_str()))
+    let rank = |p: &PathBuf| {
+        let ending = p.extension()?.to_string_lossy().to_lowercase();
+        ENDINGS.iter().position(|e| *e == ending)
     };
-    let mut files: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(taken).collect();
+    let taken = |p: PathBuf| rank(&p).filter(|_| p.is_file()).map(|rank| (p.with_extension(""), rank, p));
+    let mut found: Vec<(PathBuf, usize, PathBuf)> =
+        entries.flatten().filter_map(|e| taken(e.path())).collect();
+    found.sort();
+    found.dedup_by(|a, b| a.0 == b.0);
+    let mut files: Vec<PathBuf> = found.into_iter().map(|(.., file)| file).collect();
     files.sort();
     if files.is_empty() {
         return Err(Error::new(DataCode::RecordingEmpty, "the folder holds no recordings")
             .file(folder)
-            .help("a campaign is a folder with recordings in it (CSV, Parquet, MATLAB, HDF5, MCAP); folders within it are not entered"));
+            .help("a campaign is a folder with recordings in it (CSV, Parquet, MATLAB, HDF5, MCAP, TDMS, LVM, workbooks); folders within it are not entered"));
     }
     Ok(files)
 }
@@ -124,4 +132,25 @@ pub(super) fn read(request: &Request<'_>, console: &Console) -> Result<Vec<Found
     }
     all.sort_by(|a, b| a.visit.date.total_cmp(&b.visit.date));
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
+
+    use super::*;
+
+    #[test]
+    fn a_folder_gives_its_recordings_of_every_format_once() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.csv", "a.mcap", "b.tdms", "b.tdms_index", "c.XLSX", "notes.md", "d.lvm", "e.ods"] {
+            std::fs::write(folder.path().join(name), "x").unwrap();
+        }
+        let names: Vec<String> = recordings_in(folder.path())
+            .unwrap()
+            .iter()
+            .map(|p| p.file_name().unwrap().to_string_lossy().into_owned())
+            .collect();
+        assert_eq!(names, ["a.csv", "b.tdms", "c.XLSX", "d.lvm", "e.ods"]);
+    }
 }

@@ -45,7 +45,6 @@ impl Layout {
             })
         };
         let data_at = rows.iter().position(is_row)?;
-        let mut above = rows[..data_at].iter().enumerate().rev().filter_map(|(n, r)| Some((n, r.as_ref()?)));
         let mut layout = Self {
             delimiter: dialect.delimiter,
             decimal_comma: dialect.decimal_comma,
@@ -55,24 +54,62 @@ impl Layout {
             units: None,
             data_at,
         };
-        let named = |row: &[String]| {
-            row.len() == width
-                && row.iter().filter(|c| !c.is_empty()).all(|c| !number_of(c, dialect.decimal_comma))
-        };
-        if let Some((at, row)) = above.next().filter(|(_, row)| named(row)) {
-            (layout.names_at, layout.names) = (Some(at), row.clone());
-            if are_units(row)
-                && let Some((at, names)) = above.next().filter(|(_, names)| named(names))
-            {
-                layout.units = Some(row.clone());
-                (layout.names_at, layout.names) = (Some(at), names.clone());
-            }
-        } else if let Some(remark) = judged[..data_at].iter().rev().find(|l| l.first() == Some(&b'#'))
-            && let Some(row) = cells(remark[1..].trim_ascii(), dialect).filter(|row| named(row))
-        {
-            layout.names = row;
-        }
+        layout.find_names(&rows, dialect, judged);
         Some(layout)
+    }
+
+    /// Looks for the names, and for units below them, above the first row.
+    fn find_names(&mut self, rows: &[Option<Vec<String>>], dialect: Dialect, lines: &[&[u8]]) {
+        let width = self.names.len();
+        let words = |row: &[String]| {
+            row.iter().filter(|c| !c.is_empty()).all(|c| !number_of(c, dialect.decimal_comma))
+        };
+        let named = |row: &[String]| row.len() == width && words(row);
+        let mut above =
+            rows[..self.data_at].iter().enumerate().rev().filter_map(|(n, r)| Some((n, r.as_ref()?)));
+        match above.next() {
+            Some((at, row)) if named(row) => {
+                (self.names_at, self.names) = (Some(at), row.clone());
+                if are_units(row)
+                    && let Some((at, names)) = above.next().filter(|(_, names)| named(names))
+                {
+                    self.units = Some(row.clone());
+                    (self.names_at, self.names) = (Some(at), names.clone());
+                }
+            }
+            // Loggers write names for a column of remarks that most rows lack, or end every row with a delimiter.
+            Some((_, row)) if words(row) && row.len() == width + 1 => self.names = row[..width].to_vec(),
+            Some((_, row)) if words(row) && row.len() + 1 == width && ends_empty(rows, width) => {
+                self.names[..width - 1].clone_from_slice(row);
+            }
+            _ => {
+                let remark = lines[..self.data_at].iter().rev().find(|l| l.first() == Some(&b'#'));
+                let row = remark.and_then(|remark| cells(remark[1..].trim_ascii(), dialect));
+                if let Some(row) = row.filter(|row| named(row)) {
+                    self.names = row;
+                }
+            }
+        }
+        self.of_labview(rows);
+    }
+
+    /// In a measurement file of LabVIEW the first column is the time in seconds, and the units of the others are in a line above.
+    fn of_labview(&mut self, rows: &[Option<Vec<String>>]) {
+        let of_line = |name: &str| {
+            let first = |row: &&Vec<String>| row.first().is_some_and(|cell| cell == name);
+            rows[..self.data_at].iter().flatten().rev().find(first)
+        };
+        if self.names[0] != "X_Value"
+            || of_line("X_Dimension").is_none_or(|row| row.get(1).is_none_or(|x| x != "Time"))
+        {
+            return;
+        }
+        let labels = of_line("Y_Unit_Label").map(|row| &row[1..]).unwrap_or_default();
+        let unit = |n: usize| labels.get(n).cloned().unwrap_or_default();
+        self.units =
+            Some(std::iter::once("s".to_owned()).chain((0..self.names.len() - 1).map(unit)).collect());
+        "Time".clone_into(&mut self.names[0]);
+        self.names_at = None;
     }
 
     /// How its lines are cut.
@@ -144,7 +181,8 @@ fn dialect(lines: &[&[u8]]) -> Option<(Dialect, usize)> {
     let mut best: Option<(f64, Dialect, usize)> = None;
     for delimiter in *b"\t;,| " {
         for decimal_comma in [false, true] {
-            if delimiter == b',' && decimal_comma {
+            // Between commas, decimal commas are possible in quotation marks only.
+            if delimiter == b',' && decimal_comma && !body.iter().any(|l| l.contains(&b'"')) {
                 continue;
             }
             let dialect = Dialect { delimiter, comment: Some(b'#'), decimal_comma, skip_missing: false };
@@ -187,6 +225,11 @@ fn numeric_columns(rows: &[Option<Vec<String>>], width: usize, decimal_comma: bo
     (0..width).map(share).collect()
 }
 
+/// Whether the last cell of every row is empty, since it ends with a delimiter.
+fn ends_empty(rows: &[Option<Vec<String>>], width: usize) -> bool {
+    rows.iter().flatten().filter(|row| row.len() == width).all(|row| row[width - 1].is_empty())
+}
+
 /// Whether a row consists of units: at least two, and at least half of its cells.
 fn are_units(row: &[String]) -> bool {
     let units = row.iter().filter(|c| unit(c.trim_matches(['[', ']', '(', ')', ' '])).is_some()).count();
@@ -222,6 +265,25 @@ mod tests {
 
         let remark = of(&format!("# time force\n{}", rows("1.5 2.5")));
         assert!(remark.remarks && remark.names == ["time", "force"]);
+    }
+
+    #[test]
+    fn names_of_rows_with_another_width_are_found() {
+        let rows = |row: &str| format!("{row}\n").repeat(12);
+        let closed = of(&format!("time_s,force_N\n{}", rows("0.5,7,")));
+        assert_eq!(
+            (closed.names, closed.names_at, closed.data_at),
+            (vec!["time_s".into(), "force_N".into(), "3".into()], None, 1)
+        );
+        let remarks = of(&format!("time_s,force_N,remark\n{}", rows("0.5,7")));
+        assert_eq!((remarks.names, remarks.names_at), (vec!["time_s".to_owned(), "force_N".into()], None));
+        let head = "LabVIEW Measurement\t\nY_Unit_Label\tkPa\tN\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n";
+        let labview = of(&format!("{head}X_Value\tP1\tLoad\tComment\n{}", rows("0.5\t7\t3")));
+        assert_eq!(
+            (labview.names, labview.names_at),
+            (vec!["Time".to_owned(), "P1".into(), "Load".into()], None)
+        );
+        assert_eq!(labview.units, Some(vec!["s".to_owned(), "kPa".into(), "N".into()]));
     }
 
     #[test]

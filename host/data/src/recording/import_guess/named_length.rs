@@ -3,8 +3,9 @@
 use regex_lite::Regex;
 
 use super::Guess;
+use super::named_pressure::{GAP, NUMBER};
 use super::others::Others;
-use crate::recording::Quantity;
+use crate::recording::{Quantity, decimal};
 
 /// Units that are looked for in names.
 const UNITS: [&str; 3] = ["mm", "cm", "in"];
@@ -43,13 +44,14 @@ pub(super) fn find(others: &Others<'_>, guess: &mut Guess) {
 
 /// A regular expression that catches the length behind `place` others.
 fn pattern(quantity: &str, unit: &str, place: usize) -> String {
-    const NUMBER: &str = "[0-9]+(?:[.][0-9]+)?";
-    let before = format!("(?:.*?{NUMBER} ?{unit})").repeat(place);
-    format!("^{before}.*?(?<{quantity}_{unit}>{NUMBER}) ?{unit}(?:[^A-Za-z]|$)")
+    // `run3_in_water` says no length.
+    let gap = if unit == "in" { " ?" } else { GAP };
+    let before = format!("(?:.*?{NUMBER}{gap}{unit})").repeat(place);
+    format!("^{before}(?:|.*?[^0-9])(?<{quantity}_{unit}>{NUMBER}){gap}{unit}(?:[^A-Za-z]|$)")
 }
 
 /// What the pattern catches in each name; `None` where it finds nothing in one of them.
 fn lengths(names: &[String], pattern: &str) -> Option<Vec<f64>> {
     let pattern = Regex::new(pattern).ok()?;
-    names.iter().map(|name| pattern.captures(name)?.get(1)?.as_str().parse().ok()).collect()
+    names.iter().map(|name| decimal::caught(pattern.captures(name)?.get(1)?.as_str())).collect()
 }

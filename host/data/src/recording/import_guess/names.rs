@@ -7,7 +7,8 @@ use crate::recording::Quantity;
 
 use self::units::counts_from_vacuum;
 pub(super) use self::units::{Family, UnitSpelling, unit};
-use self::vocabulary::{AT_REST, COMMANDED, DERIVED, LENGTHENING, NEUTRAL, RUNS, STRONG, WAYS, WEAK};
+pub(super) use self::vocabulary::RUNS;
+use self::vocabulary::{AT_REST, COMMANDED, DERIVED, LENGTHENING, NEUTRAL, STRONG, WAYS, WEAK};
 
 /// A column's name, taken apart.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -24,7 +25,8 @@ pub(super) type Score = i32;
 impl Name {
     /// `Pressure [bar]`, `F (N)`, `t_s`, `Kraft / N`, `load cell`.
     pub(super) fn of(header: &str) -> Self {
-        let header = header.trim().trim_matches('"').trim();
+        let narrow = header.replace('（', "(").replace('）', ")").replace('［', "[").replace('］', "]");
+        let header = narrow.trim().trim_matches('"').trim();
         if let Some(name) = Self::with_mark(header).or_else(|| Self::of_ratio(header)) {
             return name;
         }
@@ -39,6 +41,8 @@ impl Name {
             if let Some((base, last)) = header.rsplit_once(separator)
                 && !base.trim().is_empty()
                 && let Some(found) = unit(last)
+                // The `1` of `Load_1` counts; only a fraction bar makes a unit of it.
+                && (found.family != Family::Ratio || separator.contains('/') || !["1", "-"].contains(&found.text))
             {
                 return Self { words: words(base), unit: Some(found), unknown_unit: None };
             }
@@ -265,6 +269,15 @@ mod tests {
             ("p_soll (bar)", Quantity::PressureCommand, "bar"),
             ("muscle1_pressure_command_bar", Quantity::PressureCommand, "bar"),
             ("Temp. [°C]", Quantity::Temperature, "C"),
+            ("Load_1", Quantity::Force, ""),
+            ("pressure 1", Quantity::Pressure, ""),
+            ("压力（kPa）", Quantity::Pressure, "kPa"),
+            ("力(N)", Quantity::Force, "N"),
+            ("変位[mm]", Quantity::Displacement, "mm"),
+            ("收缩率(%)", Quantity::Contraction, ""),
+            ("时间", Quantity::Time, ""),
+            ("Strain / %", Quantity::Contraction, ""),
+            ("ε [-]", Quantity::Contraction, ""),
         ];
         for (text, quantity, unit) in cases {
             let name = Name::of(text);

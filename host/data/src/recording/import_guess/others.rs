@@ -1,5 +1,6 @@
 //! The other files of the same bench: they may show what is uncertain from one file.
 
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
 use super::sample::{Sample, SampleColumn};
@@ -11,18 +12,68 @@ const COMPARED: usize = 30;
 pub(super) struct Others<'a> {
     pub files: &'a [PathBuf],
     /// The sheet of workbooks.
-    pub sheet: Option<&'a str>,
+    sheet: Option<&'a str>,
+    seen: OnceCell<Vec<Seen>>,
 }
 
-impl Others<'_> {
-    /// The least and the greatest number of a column in each file that has it. Files that cannot be read are left out.
-    pub(super) fn ranges(&self, header: &str) -> Vec<(f64, f64)> {
-        let range = |file: &PathBuf| {
+/// What a file holds.
+struct Seen {
+    file: String,
+    headers: Vec<String>,
+    /// Of each column of numbers.
+    ranges: Vec<(String, Range)>,
+}
+
+/// Where the numbers of a column lie in one file.
+#[derive(Clone, Copy)]
+pub(super) struct Range {
+    pub low: f64,
+    pub high: f64,
+    /// The width of the middle nine tenths: noise of a sensor makes the whole range wider with every row.
+    pub width: f64,
+}
+
+impl Range {
+    pub(super) fn of(column: &SampleColumn) -> Self {
+        let (low, high) = column.range();
+        let mut numbers: Vec<f64> = column.values().collect();
+        numbers.sort_unstable_by(f64::total_cmp);
+        let at =
+            |share: f64| numbers.get((share * numbers.len() as f64) as usize).copied().unwrap_or(f64::NAN);
+        Self { low, high, width: at(0.95) - at(0.05) }
+    }
+}
+
+impl<'a> Others<'a> {
+    /// These files beside the first; they are read once, when something asks for their contents.
+    pub(super) fn of(files: &'a [PathBuf], sheet: Option<&'a str>) -> Self {
+        Self { files, sheet, seen: OnceCell::new() }
+    }
+
+    /// The files that can be read.
+    fn seen(&self) -> &[Seen] {
+        let of_file = |file: &PathBuf| -> Option<Seen> {
             // What a pipe gives once is left for the reader.
             let sample = file.is_file().then(|| Sample::read(file, self.sheet).ok())??;
-            sample.columns.iter().find(|c| c.header == header).map(SampleColumn::range)
+            let numeric = sample.columns.iter().filter(|c| c.is_numeric());
+            Some(Seen {
+                file: file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+                headers: sample.columns.iter().map(|c| c.header.clone()).collect(),
+                ranges: numeric.map(|c| (c.header.clone(), Range::of(c))).collect(),
+            })
         };
-        self.files.iter().take(COMPARED).filter_map(range).collect()
+        self.seen.get_or_init(|| self.files.iter().take(COMPARED).filter_map(of_file).collect())
+    }
+
+    /// The range of a column in each file that has it. Files that cannot be read are left out.
+    pub(super) fn ranges(&self, header: &str) -> Vec<Range> {
+        let one = |file: &Seen| file.ranges.iter().find(|(h, _)| h == header).map(|(_, range)| *range);
+        self.seen().iter().filter_map(one).collect()
+    }
+
+    /// The first file whose columns have other names than these, or other places.
+    pub(super) fn with_other_columns(&self, headers: &[&str]) -> Option<&str> {
+        self.seen().iter().find(|file| file.headers != headers).map(|file| file.file.as_str())
     }
 
     /// Their names without folders.

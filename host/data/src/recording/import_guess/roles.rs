@@ -6,7 +6,10 @@ use super::lookup;
 use super::names::{Family, Name, Score};
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, Source, absolute, named_length, runs, stroke, time, values};
+use super::{
+    Guess, GuessedColumn, Source, absolute, named_length, named_pressure, problems, runs, stroke, time,
+    values,
+};
 use crate::recording::Quantity;
 use crate::short_number::short;
 
@@ -46,18 +49,22 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
             continue;
         }
         if let Some(n) = best(sample, quantity, &used, &mut guess)
-            && let Some(column) = described(sample, n, quantity, &mut guess)
+            && let Some(column) = described(sample, n, quantity, others, &mut guess)
         {
             used[n] = true;
             guess.columns.push(column);
         }
     }
     time::find(sample, &mut used, &mut guess);
-    find_pressure(sample, &mut guess);
+    problems::texts(sample, &mut guess);
+    named_pressure::find(sample, others, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
     named_length::find(others, &mut guess);
     stroke::judge(sample, others, &mut guess);
     absolute::ask(sample, &mut guess);
+    problems::incomplete_rows(sample, &mut guess);
+    problems::side_by_side(sample, &mut guess);
+    problems::other_columns(sample, others, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
     guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
     what_is_missing(sample, &mut guess);
@@ -82,7 +89,9 @@ fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -
         (q == quantity && c.is_numeric() && !used[n]).then_some((score, n))
     };
     let mut found: Vec<(Score, usize)> = sample.columns.iter().enumerate().filter_map(fits).collect();
-    found.sort_by_key(|(score, n)| (-score, *n));
+    // A load cell that reads one value throughout is not connected.
+    let dead = |n: usize| quantity == Quantity::Force && values::is_constant(&sample.columns[n]);
+    found.sort_by_key(|(score, n)| (dead(*n), -score, *n));
     let (score, first) = *found.first()?;
     let competitors: Vec<&str> = found[1..]
         .iter()
@@ -108,7 +117,13 @@ fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -
 }
 
 /// A column in its unit; `None` where it cannot be used.
-fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -> Option<GuessedColumn> {
+fn described(
+    sample: &Sample,
+    n: usize,
+    quantity: Quantity,
+    others: &Others<'_>,
+    guess: &mut Guess,
+) -> Option<GuessedColumn> {
     let column = &sample.columns[n];
     let (header, what) = (&column.header, quantity.name().replace('_', " "));
     if column.name.is_raw() {
@@ -124,13 +139,12 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
     } else if let Some(text) = &column.name.unknown_unit {
         guess.unknown.push(format!("{header} looks like {what}, but its unit `{text}` is not known"));
         return None;
-    } else if quantity == Quantity::Contraction && column.range().1 > 1.0 {
+    } else if quantity == Quantity::Contraction && largest(column, others) > 1.0 {
         scale = 0.01;
-        guess
-            .checks
-            .push(format!("{header} is taken as per cent, since it reaches {}", short(column.range().1)));
+        let reached = short(largest(column, others));
+        guess.checks.push(format!("{header} is taken as per cent, since it reaches {reached}"));
     } else if quantity.units().len() > 1 {
-        let Some(suggested) = values::suggested(quantity, column) else {
+        let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
             let (low, high) = column.range();
             guess.unknown.push(format!(
                 "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
@@ -169,12 +183,6 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
         }
         guess.checks.push(format!("{header}: {doubt}"));
     }
-    if column.missing > 0 {
-        guess.checks.push(format!(
-            "{header} has {} of {} cells without a number: write missing = \"skip\" to leave these rows out",
-            column.missing, sample.rows
-        ));
-    }
     if quantity == Quantity::Force && -low > high && scale > 0.0 {
         scale = -scale;
         guess.checks.push(format!(
@@ -195,45 +203,11 @@ fn described(sample: &Sample, n: usize, quantity: Quantity, guess: &mut Guess) -
     })
 }
 
-/// A pressure that the file's name or a line above the table states.
-fn find_pressure(sample: &Sample, guess: &mut Guess) {
-    if guess.has(Quantity::Pressure) {
-        return;
-    }
-    const NUMBER: &str = r"[0-9]+(?:\.[0-9]+)?";
-    for unit in Quantity::Pressure.units().iter().rev().map(|u| u.name) {
-        let line = sample.preamble.iter().find_map(|line| {
-            let found = regex_lite::Regex::new(&format!(
-                r"(?i)^(.*(?:pressure|druck)[^0-9]*{unit}[^0-9]*?)({NUMBER})"
-            ))
-            .ok()?;
-            let before = found.captures(line)?.get(1)?.as_str().to_owned();
-            Some(format!("{}(?<pressure_{unit}>{NUMBER})", regex_lite::escape(&before).replace('\t', r"\s")))
-        });
-        let behind = sample.preamble.iter().find_map(|line| {
-            let found =
-                regex_lite::Regex::new(&format!(r"(?i)^(.*(?:pressure|druck)[^0-9]*)({NUMBER})\s*{unit}\b"))
-                    .ok()?;
-            let before = found.captures(line)?.get(1)?.as_str().to_owned();
-            Some(format!(
-                r"{}(?<pressure_{unit}>{NUMBER})\s*{unit}",
-                regex_lite::escape(&before).replace('\t', r"\s")
-            ))
-        });
-        if let Some(pattern) = line.or(behind) {
-            guess.checks.push(format!("the pressure is taken from the lines above the table, in {unit}"));
-            guess.patterns.push(("preamble", pattern));
-            return;
-        }
-    }
-    for unit in Quantity::Pressure.units().iter().rev().map(|u| u.name) {
-        let pattern = format!("(?<pressure_{unit}>{NUMBER}) ?{unit}");
-        if regex_lite::Regex::new(&pattern).is_ok_and(|p| p.is_match(&guess.file)) {
-            guess.checks.push(format!("the pressure is taken from the file's name, in {unit}"));
-            guess.patterns.push(("file_name", pattern));
-            return;
-        }
-    }
+/// The largest number of a column in all files, of either sign.
+fn largest(column: &SampleColumn, others: &Others<'_>) -> f64 {
+    let (low, high) = column.range();
+    let all = others.ranges(&column.header);
+    all.iter().map(|r| r.high.max(-r.low)).fold(high.max(-low), f64::max)
 }
 
 /// Labels, directions, the list of runs and the muscles of a file.
@@ -262,11 +236,10 @@ fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess)
     let time = guess.columns.iter().find(|c| c.quantity == Quantity::Time);
     let time = time.and_then(|t| (0..sample.columns.len()).find(|n| source(sample, *n) == t.source));
     let (splits, left) = time.map(|t| runs::splits(&sample.columns, t)).unwrap_or_default();
-    if left > 0 {
-        guess.unknown.push(format!(
-            "time does not increase at {left} rows, and no column says which run a row belongs to: make one file of each run, or remove \
-             the rows that are given twice"
-        ));
+    if left > 0
+        && let Some(t) = time
+    {
+        problems::clock(&sample.columns[t], left, guess);
     }
     for n in splits {
         used[n] = true;
@@ -339,23 +312,30 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
-    if !guess.has(Quantity::Time) && !guess.unknown.iter().any(|u| u.contains("times of day")) {
+    let told = |guess: &Guess, quantity: Quantity| {
+        let named = |c: &&SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == quantity);
+        sample.columns.iter().filter(named).any(|c| guess.unknown.iter().any(|u| u.starts_with(&c.header)))
+    };
+    if !guess.has(Quantity::Time) && !told(guess, Quantity::Time) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
         guess.unknown.insert(0, text.to_owned());
     }
     let caught =
         |guess: &Guess, name: &str| guess.patterns.iter().any(|(_, p)| p.contains(&format!("<{name}_")));
-    if !guess.has(Quantity::Pressure) && !caught(guess, "pressure") {
-        let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants]";
+    let unclear = guess.unknown.iter().any(|u| u.contains("pressure"));
+    if !guess.has(Quantity::Pressure) && !caught(guess, "pressure") && !unclear {
+        let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants], or catch it from the \
+                    names of the files by file_name = '(?<pressure_kPa>[0-9.]+)'";
         guess.unknown.push(text.to_owned());
     }
     let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
-    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, q.name())) {
+    let told_of_stroke = stroke.iter().any(|q| told(guess, *q));
+    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, q.name())) && !told_of_stroke {
         let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
                     under [constants], or give the files of all lengths, whose names say it";
         guess.unknown.push(text.to_owned());
     }
-    if !guess.has(Quantity::Force) {
+    if !guess.has(Quantity::Force) && !told(guess, Quantity::Force) {
         guess.unknown.push("no column of force: a fit and a diagnosis need it".to_owned());
     }
     if !sample.whole {

@@ -10,6 +10,7 @@ use crate::date::time_stamp;
 use crate::error::{DataCode, Error, Result};
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
+use crate::recording::line::decode;
 use crate::recording::mcap::Needed;
 use crate::recording::source;
 #[cfg(feature = "excel")]
@@ -34,6 +35,8 @@ pub(super) struct SampleColumn {
     pub missing: usize,
     /// Cells that are neither numbers nor missing.
     pub texts: usize,
+    /// The first of these.
+    pub first_text: Option<String>,
     /// How many of these are dates with a time of day, or times of day.
     pub stamps: usize,
     /// The different cells, where there are few, and which of them each row has.
@@ -78,6 +81,7 @@ impl SampleColumn {
             None if is_missing(cell) => self.missing += 1,
             None => {
                 self.texts += 1;
+                self.first_text.get_or_insert_with(|| cell.to_owned());
                 self.stamps += usize::from(stamp.is_some());
             }
             Some(_) => {}
@@ -172,7 +176,7 @@ impl Sample {
             ));
         };
         let dialect = layout.dialect();
-        let lossy = |l: &&[u8]| String::from_utf8_lossy(l).trim_end().to_owned();
+        let lossy = |l: &&[u8]| decode(l).trim_end().to_owned();
         let names_at = layout.names_at.unwrap_or(layout.data_at);
         let mut sample = Self {
             has_header: layout.has_header(&lines),

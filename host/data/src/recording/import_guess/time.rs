@@ -26,7 +26,12 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
         }
         return;
     }
-    if let Some(column) = sample.columns.iter().find(|c| !c.is_numeric() && is_time(c)) {
+    // Dates have two separators, times of day colons.
+    let dated = |c: &SampleColumn| {
+        let text = c.first_text.as_deref().unwrap_or_default();
+        text.contains(':') || text.matches(['-', '/', '.']).count() > 1
+    };
+    if let Some(column) = sample.columns.iter().find(|c| !c.is_numeric() && is_time(c) && dated(c)) {
         guess.unknown.push(format!(
             "{} holds dates or times of day that are not read: write them as 2026-11-21T13:30:00.25, write seconds from some beginning, or \
              give sample_interval_s",
@@ -42,8 +47,11 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
             && !values::counts_rows(c)
     };
     if let Some((n, column)) = sample.columns.iter().enumerate().find(unnamed)
-        && let Some(suggested) = values::suggested(Quantity::Time, column)
+        && let Some(suggested) = values::suggested(Quantity::Time, column, &[])
     {
+        if sample.columns.iter().any(|c| is_time(c) && !c.is_numeric()) {
+            return;
+        }
         used[n] = true;
         guess.checks.push(format!(
             "column {} is taken as the time in {}, since it increases from row to row",

@@ -1,11 +1,12 @@
 //! What the values of a column say: the unit that a name does not say, and whether a unit can be right.
 
+use super::others::Range;
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
 use crate::short_number::short;
 
 /// Gauge pressures of pneumatic muscles, Pa: from the threshold of a thin bladder to the compressed air of a building.
-const PRESSURES: (f64, f64) = (100e3, 1e6);
+pub(super) const PRESSURES: (f64, f64) = (100e3, 1e6);
 /// Strokes of pneumatic muscles on a bench, m.
 const STROKES: (f64, f64) = (1e-3, 0.5);
 /// Times between rows, s: loggers record at 2 Hz to 20 kHz.
@@ -28,9 +29,12 @@ fn allowed(value: f64, bounds: (f64, f64), units: &[(&'static str, f64, f64)]) -
     Some(Suggested { unit, scale, others: fits.map(|(u, ..)| *u).collect() })
 }
 
-/// A unit for values whose name says none; `None` where they fit none or several quantities need none.
-pub(super) fn suggested(quantity: Quantity, column: &SampleColumn) -> Option<Suggested> {
+/// A unit for values whose name says none; `None` where they fit none or several quantities need none. `others`: what the same column
+/// holds in other files of the bench, since the first may be that of the lowest pressure.
+pub(super) fn suggested(quantity: Quantity, column: &SampleColumn, others: &[Range]) -> Option<Suggested> {
     let (low, high) = column.range();
+    let widest = others.iter().map(|r| r.high - r.low).fold(high - low, f64::max);
+    let high = others.iter().map(|r| r.high).fold(high, f64::max);
     match quantity {
         Quantity::Pressure | Quantity::PressureCommand => {
             let units = [
@@ -43,7 +47,7 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn) -> Option<Sug
             allowed(high, PRESSURES, &units)
         }
         Quantity::Displacement | Quantity::Length | Quantity::RestLength => {
-            let size = if quantity == Quantity::Displacement { high - low } else { high };
+            let size = if quantity == Quantity::Displacement { widest } else { high };
             allowed(size, STROKES, &[("mm", 1.0, 1e-3), ("m", 1.0, 1.0), ("in", 1.0, 0.0254)])
         }
         Quantity::Time => {
@@ -53,6 +57,12 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn) -> Option<Sug
         Quantity::Temperature => Some(Suggested { unit: "C", scale: 1.0, others: vec![] }),
         _ => Some(Suggested { unit: "", scale: 1.0, others: vec![] }),
     }
+}
+
+/// Whether all numbers are the same.
+pub(super) fn is_constant(column: &SampleColumn) -> bool {
+    let (low, high) = column.range();
+    low == high
 }
 
 /// The median step between rows.
@@ -112,11 +122,16 @@ pub(super) fn force_against(stroke: &[f64], force: &[f64], pressure: Option<&[f6
 
 /// Correlation of pressure with displacement where the pressure varies on purpose: positive where the displacement shortens the muscle.
 pub(super) fn pressure_against(stroke: &[f64], pressure: &[f64]) -> Option<f64> {
+    is_varied(pressure).then(|| correlation(pressure, stroke))?
+}
+
+/// Whether a pressure varies on purpose, by more than a regulator's droop.
+pub(super) fn is_varied(pressure: &[f64]) -> bool {
     /// A regulator's droop is less than this share of the highest pressure.
     const VARIED: f64 = 0.5;
-    let finite = || pressure.iter().copied().filter(|p| p.is_finite());
-    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
-    (high - low > VARIED * low.abs().max(high.abs())).then(|| correlation(pressure, stroke))?
+    let finite = pressure.iter().copied().filter(|p| p.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    high - low > VARIED * low.abs().max(high.abs())
 }
 
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
@@ -142,7 +157,7 @@ mod tests {
 
     #[test]
     fn values_suggest_the_unit_that_a_muscle_allows() {
-        let unit = |q, high: f64| suggested(q, &column([0.0, high])).map(|s| s.unit);
+        let unit = |q, high: f64| suggested(q, &column([0.0, high]), &[]).map(|s| s.unit);
         assert_eq!(unit(Quantity::Pressure, 620.0), Some("kPa"));
         assert_eq!(unit(Quantity::Pressure, 6.2), Some("bar"));
         assert_eq!(unit(Quantity::Pressure, 90.0), Some("psi"));
@@ -152,12 +167,15 @@ mod tests {
         assert_eq!(unit(Quantity::Displacement, 35.0), Some("mm"));
         assert_eq!(unit(Quantity::Displacement, 0.035), Some("m"));
         let at = |step: f64| {
-            suggested(Quantity::Time, &column((0..20).map(|i| f64::from(i) * step))).expect("a unit")
+            suggested(Quantity::Time, &column((0..20).map(|i| f64::from(i) * step)), &[]).expect("a unit")
         };
         assert_eq!((at(0.01).unit, at(10.0).unit), ("s", "ms"));
         assert_eq!((at(1000.0).unit, at(1000.0).scale), ("ms", 1e-3));
         // 120 may be kPa or psi, and is reported so.
-        assert_eq!(suggested(Quantity::Pressure, &column([0.0, 120.0])).map(|s| s.others), Some(vec!["psi"]));
+        assert_eq!(
+            suggested(Quantity::Pressure, &column([0.0, 120.0]), &[]).map(|s| s.others),
+            Some(vec!["psi"])
+        );
     }
 
     #[test]

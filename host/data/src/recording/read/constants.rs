@@ -1,6 +1,7 @@
 //! Values that are constant over a file.
 
 use crate::error::{DataCode, Error, Result};
+use crate::recording::decimal;
 use crate::recording::import::{self, pattern as pattern_of};
 
 /// Values that are constant over a file, from its name or the lines above its table.
@@ -28,7 +29,7 @@ impl Constants {
                 self.labels.push((group.to_owned(), caught.to_owned()));
                 continue;
             }
-            let value = caught.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+            let value = decimal::caught(caught).ok_or_else(|| {
                 Error::new(DataCode::ImportInvalid, format!("{key} matches no number for {group}"))
                     .value(caught)
             })?;

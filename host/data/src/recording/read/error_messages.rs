@@ -77,6 +77,11 @@ pub(super) fn rows_error(error: RowsError, header: &Header, import: &Import) -> 
             let help = if *found == 2 * expected && separator == "commas" {
                 "these look like decimal commas: use a decimal point, or an import description with decimal = \"comma\""
                     .to_owned()
+            } else if let Some(sign) = value.chars().next().filter(|c| "%;!/'*".contains(*c)) {
+                format!(
+                    "cells are separated by {separator}; if lines that begin with {sign} are remarks, write comment = \"{sign}\" in an import \
+                     description"
+                )
             } else {
                 format!("cells are separated by {separator}; the line may be incomplete or damaged")
             };

@@ -131,9 +131,10 @@ const STROKES: [(f64, &str); 4] = [
     (39.370_08, "metres to inches"),
     (1000.0, "m to mm, or mm to µm"),
 ];
-const FORCES: [(f64, &str); 4] = [
+const FORCES: [(f64, &str); 5] = [
     (4.448_222, "lbf to N"),
     (9.806_65, "kgf to N"),
+    (101.971_6, "N to gf"),
     (224.808_9, "kN to lbf"),
     (1000.0, "kN to N, or N to mN"),
 ];

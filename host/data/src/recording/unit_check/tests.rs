@@ -61,6 +61,7 @@ fn every_unit_in_every_recording_of_some_force_is_found_and_nothing_else() {
             (Column::Force, 4.448_222),
             (Column::Force, 1000.0),
             (Column::Force, 0.001),
+            (Column::Force, 0.009_806_65),
         ] {
             let there = found(&spoiled(which, column, |v| v / factor));
             let [(at, Mistake { column: in_column, wrong: MistakeKind::Unit(told, _) })] = there[..] else {

@@ -18,9 +18,27 @@ pub(super) const STRONG: &[(Quantity, &[&str])] = &[
             "zeitstempel",
             "seconds",
             "datetime",
+            "时间",
+            "時間",
+            "時刻",
         ],
     ),
-    (Quantity::Pressure, &["pressure", "druck", "pression", "presion", "pressione", "press", "ueberdruck"]),
+    (
+        Quantity::Pressure,
+        &[
+            "pressure",
+            "druck",
+            "pression",
+            "presion",
+            "pressione",
+            "press",
+            "ueberdruck",
+            "压力",
+            "气压",
+            "圧力",
+            "압력",
+        ],
+    ),
     (
         Quantity::Displacement,
         &[
@@ -40,10 +58,31 @@ pub(super) const STRONG: &[(Quantity, &[&str])] = &[
             "verschiebung",
             "verkuerzung",
             "traverse",
+            "位移",
+            "变位",
+            "変位",
+            "行程",
+            "변위",
         ],
     ),
-    (Quantity::Length, &["length", "laenge", "longueur", "longitud", "lunghezza"]),
-    (Quantity::Contraction, &["contraction", "kontraktion", "contraccion", "contrazione"]),
+    (Quantity::Length, &["length", "laenge", "longueur", "longitud", "lunghezza", "长度", "長さ"]),
+    (
+        Quantity::Contraction,
+        &[
+            "contraction",
+            "kontraktion",
+            "contraccion",
+            "contrazione",
+            "收缩率",
+            "收缩",
+            "収縮率",
+            "収縮",
+            "strain",
+            "dehnung",
+            "epsilon",
+            "eps",
+        ],
+    ),
     (
         Quantity::Force,
         &[
@@ -57,10 +96,16 @@ pub(super) const STRONG: &[(Quantity, &[&str])] = &[
             "tension",
             "thrust",
             "effort",
+            "力",
+            "拉力",
+            "荷重",
+            "载荷",
+            "張力",
+            "힘",
         ],
     ),
-    (Quantity::Temperature, &["temperature", "temperatur", "temp", "temperatura"]),
-    (Quantity::Cycle, &["cycle", "zyklus", "ciclo"]),
+    (Quantity::Temperature, &["temperature", "temperatur", "temp", "temperatura", "温度"]),
+    (Quantity::Cycle, &["cycle", "zyklus", "ciclo", "周期", "循环"]),
 ];
 
 /// Words and symbols that name a quantity where nothing better does.
@@ -70,6 +115,7 @@ pub(super) const WEAK: &[(Quantity, &[&str])] = &[
     (Quantity::Displacement, &["position", "pos", "x", "travel", "course"]),
     (Quantity::Force, &["load", "f", "last", "pull", "charge", "carga"]),
     (Quantity::Length, &["l"]),
+    (Quantity::Contraction, &["ε"]),
 ];
 
 /// Words of a commanded value beside a measured one.
@@ -132,7 +178,7 @@ pub(super) const NEUTRAL: &[&str] = &[
 pub(super) const LENGTHENING: &[&str] = &["extension", "elongation", "crosshead", "traverse"];
 
 /// Words of columns that set runs apart.
-pub(super) const RUNS: &[&str] = &[
+pub(in super::super) const RUNS: &[&str] = &[
     "run",
     "trial",
     "repeat",

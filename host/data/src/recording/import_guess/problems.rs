@@ -1,0 +1,139 @@
+//! What is wrong with a file for every reader: words among numbers, rows without numbers, recordings side by side.
+
+use super::others::Others;
+use super::sample::{Sample, SampleColumn};
+use super::{Guess, GuessedColumn, Source, roles};
+use crate::pluralise::pluralise;
+use crate::recording::Quantity;
+
+/// Columns that are named for a quantity and hold cells that are no numbers.
+pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
+    for column in &sample.columns {
+        let Some((quantity, _)) = column.name.quantity() else { continue };
+        let told = guess.unknown.iter().any(|line| line.starts_with(&column.header));
+        let coded = matches!(quantity, Quantity::Direction | Quantity::Cycle);
+        if column.texts == 0 || coded || told || guess.has(quantity) {
+            continue;
+        }
+        let cell = column.first_text.as_deref().unwrap_or_default();
+        let advice = if has_thousands(cell) {
+            "write numbers without separators of thousands"
+        } else {
+            "remove these cells, or write all decimals with the same sign"
+        };
+        guess.unknown.push(format!(
+            "{} looks like {}, but {} of {} cells are no numbers, such as `{}`: {advice}",
+            column.header,
+            quantity.name().replace('_', " "),
+            column.texts,
+            sample.rows,
+            cell.chars().take(40).flat_map(char::escape_debug).collect::<String>()
+        ));
+    }
+}
+
+/// Whether a cell is a number with separators of thousands: `1,234.5`, `1.234,5`, `1 234`, `1'234`.
+fn has_thousands(cell: &str) -> bool {
+    let bare = cell.trim_start_matches(['-', '+']);
+    [',', '.', ' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}'].iter().any(|separator| {
+        let mut groups = bare.split(*separator);
+        let first = groups.next().unwrap_or_default();
+        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        let rest: Vec<&str> = groups.collect();
+        let group = |(n, text): (usize, &&str)| {
+            let last = n + 1 == rest.len();
+            let whole = if last { text.split([',', '.']).next().unwrap_or_default() } else { text };
+            whole.len() == 3 && digits(whole)
+        };
+        digits(first) && first.len() <= 3 && !rest.is_empty() && rest.iter().enumerate().all(group)
+    })
+}
+
+/// Rows without a number in a column that is used.
+pub(super) fn incomplete_rows(sample: &Sample, guess: &mut Guess) {
+    let column = |column: &GuessedColumn| {
+        let n = (0..sample.columns.len()).find(|n| roles::source(sample, *n) == column.source)?;
+        (column.quantity != Quantity::Direction).then_some(&sample.columns[n])
+    };
+    let used: Vec<&SampleColumn> = guess.columns.iter().filter_map(column).collect();
+    let lacking: Vec<&&SampleColumn> = used.iter().filter(|c| c.missing > 0).collect();
+    if lacking.is_empty() {
+        return;
+    }
+    let whole = |row: &usize| used.iter().all(|c| c.numbers.get(*row).is_some_and(|v| v.is_finite()));
+    let complete = (0..sample.rows).filter(whole).count();
+    let names: Vec<&str> = lacking.iter().map(|c| c.header.as_str()).collect();
+    let most = lacking.iter().map(|c| c.missing).max().unwrap_or_default();
+    let without = format!(
+        "{} {} up to {most} of {} cells without a number",
+        names.join(", "),
+        if names.len() == 1 { "has" } else { "have" },
+        sample.rows
+    );
+    if 2 * complete < sample.rows {
+        guess.unknown.push(format!(
+            "{without}, and only {} a number in every column: where the channels were recorded at different times, interpolate them to \
+             the times of one of them",
+            match complete {
+                0 => "no row has".to_owned(),
+                1 => "one row has".to_owned(),
+                n => format!("{} have", pluralise(n, "row")),
+            }
+        ));
+    } else {
+        guess.checks.push(format!(
+            "{without}: write missing = \"skip\" to leave {} out",
+            pluralise(sample.rows - complete, "row")
+        ));
+    }
+}
+
+/// Several recordings beside each other, each with its own columns.
+pub(super) fn side_by_side(sample: &Sample, guess: &mut Guess) {
+    let count = |quantity: Quantity| {
+        let named = |c: &&SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == quantity);
+        sample.columns.iter().filter(named).count()
+    };
+    let times = count(Quantity::Time);
+    if times > 1 && count(Quantity::Force) == times {
+        guess.unknown.push(format!(
+            "{times} columns of time and {times} of force: the recordings seem to stand side by side, and only the first is described; make \
+             one file of each"
+        ));
+    }
+}
+
+/// A time that does not increase at some rows of the same run.
+pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
+    /// Counters of microcontrollers begin again here.
+    const WRAPS: f64 = 4_294_967_296.0;
+    /// Of that, how near to it the last reading before is, and how near to zero the first one after.
+    const NEAR: f64 = 0.01;
+    let rows = time.numbers.len();
+    let wraps = |w: &[f64]| w[0] > (1.0 - NEAR) * WRAPS && w[0] < WRAPS && w[1] < NEAR * WRAPS;
+    let problem = if 4 * at > rows {
+        "the clock is coarser than the rows: log more digits, or replace the time by sample_interval_s where rows are equally spaced"
+            .to_owned()
+    } else if let (1, Some(row)) = (at, time.numbers.windows(2).position(wraps)) {
+        format!(
+            "a counter of 32 bits began again behind row {}: add 4294967296 to the times that follow",
+            row + 1
+        )
+    } else {
+        "no column says which run a row belongs to: make one file of each run, or remove the rows that are given twice".to_owned()
+    };
+    guess.unknown.push(format!("time does not increase at {}; {problem}", pluralise(at, "row")));
+}
+
+/// Files whose columns are in another order, where the description counts columns: nothing else would notice.
+pub(super) fn other_columns(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
+    if !guess.columns.iter().any(|c| matches!(c.source, Source::Number(_))) {
+        return;
+    }
+    let headers: Vec<&str> = sample.columns.iter().map(|c| c.header.as_str()).collect();
+    if let Some(file) = others.with_other_columns(&headers) {
+        guess.unknown.push(format!(
+            "the columns of {file} have other names or another order, and the description counts them: describe such files by themselves"
+        ));
+    }
+}
