@@ -76,7 +76,7 @@ fn answers(writes: usize) -> Vec<(Kind, u16)> {
         started_by: StartedBy::Power,
         fault: None,
     };
-    let mut server = Server::start(identity, MockFlash::erased(), &shared).expect("a store");
+    let server = Gate::new(Server::start(identity, MockFlash::erased(), &shared).expect("a store"));
     let mut received = Received(Vec::new());
     for (id, sequence) in [(GetStatus::ID, 1), (Restart::ID, 2), (GetStatus::ID, 3)] {
         let mut wire = [0; MAX_WIRE];
@@ -85,7 +85,7 @@ fn answers(writes: usize) -> Vec<(Kind, u16)> {
         received.0.extend_from_slice(&wire[..length]);
     }
     let sender = Gate::new(Sent(Vec::new(), writes));
-    block_on(pin!(link(&mut received, &sender, &mut server, &shared)));
+    block_on(pin!(link(Line::Serial, &mut received, &sender, &server, &shared)));
     frames(&sender.into_inner().0)
 }
 
@@ -107,7 +107,7 @@ fn telemetry_is_sent_until_the_port_is_gone() {
     }
     // A second topic ends it: the line takes one.
     block_on(pin!(async {
-        embassy_futures::select::select(telemetry(&sender, &shared), async {
+        embassy_futures::select::select(telemetry(&sender, &shared, |_| {}), async {
             for _ in 0..100 {
                 shared.step(&Inputs { sides: [Some(now.into()), None], ..Inputs::default() });
                 embassy_futures::yield_now().await;

@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use model_core::link::Endpoint;
-use model_core::link::can::{Address, DATA, Receiver, Route, Sender};
+use model_core::link::can::{Address, Format, Receiver, Route, Sender};
 use model_core::link::endpoints::{Arm, Disarm, GetSettings, GetStatus, SetTo, StartMode, Stop};
 use model_core::link::frame::{Accumulator, MAX_WIRE, encode};
 use model_core::link::messages::Start;
@@ -148,7 +148,7 @@ fn each_device_answers_for_itself_and_one_message_vents_all() {
         let header = Header { kind: Kind::Request, id, sequence: 1 };
         length += encode(header, &(), &mut wire[length..]).expect("a frame");
     }
-    assert!(length <= DATA, "{length} bytes");
+    assert!(length <= Format::Fd.data(), "{length} bytes");
     let mut sent = Vec::new();
     let sender = &mut bus.to_all;
     sender.send(&wire[..length], |message| sent.push((Route::ToAll.identifier(), message.to_vec())));
