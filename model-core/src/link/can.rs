@@ -70,6 +70,9 @@ const FROM_DEVICE: u16 = 0x200;
 pub struct Address(u8);
 
 impl Address {
+    /// The first.
+    pub const FIRST: Self = Self(1);
+
     /// The address of a number, if there is one.
     pub const fn new(number: u8) -> Option<Self> {
         if number >= 1 && number <= DEVICES { Some(Self(number)) } else { None }
