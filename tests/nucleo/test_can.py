@@ -6,7 +6,7 @@
 import unittest
 
 from board import TABLE, Board
-from can_bus import TO_ALL, TO_DEVICE, VENT, Bus, Host
+from can_bus import TO_ALL, TO_DEVICE, VENT, Bus, Host, bits
 from link import (
     FORCE_MODE, PRESSURE_MODE, REQUEST, RESTART, SET_SETTINGS, SETTINGS, STATUS, Link, Refused, frame, varint,
 )
@@ -105,9 +105,15 @@ class Transport(unittest.TestCase):
         board = on_bus()
         board.link.ask(TELEMETRY, varint(10))
         list(board.link.frames())
+        before = len(board.bus.log)
         board.run(0.5)
         samples = [sequence for kind, number, sequence, _ in board.link.frames() if (kind, number) == (3, 128)]
         self.assertAlmostEqual(len(samples), 50, delta=2)
+        messages = [data for _, identifier, data in board.bus.log[before:] if identifier == 0x201]
+        self.assertEqual(round(len(messages) / len(samples)), 8)
+        taken = sum(bits(0x201, len(data), data) + 3 for data in messages) / 500e3 / len(samples)
+        print(f"\na sample takes {taken * 1e3:.2f} ms of a bus of 500 kbit/s")
+        self.assertLess(4 * 100 * taken, 0.8, "four devices at 100 samples a second leave room")
         self.assertEqual(samples, list(range(samples[0], samples[0] + len(samples))))
 
     def test_more_telemetry_than_the_bus_carries_delays_neither_answers_nor_the_serial_line(self):

@@ -254,8 +254,9 @@ fn a_table_goes_over_the_bus_and_a_run_is_controlled_and_vented_there() {
 
 #[test]
 fn lost_messages_cost_repeats_and_nothing_else() {
-    let bus = Bus::new(1, Vice::Loses(40));
+    let bus = Bus::new(1, Vice::Loses(90));
     let mut client = Client::open(&bus.address("1")).expect("a controller answers");
+    // An answer has 53 messages: of some, one is lost.
     for _ in 0..10 {
         client.call::<GetSettings>(&()).expect("settings");
     }
