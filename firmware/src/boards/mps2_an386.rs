@@ -156,7 +156,8 @@ async fn telemetry(port: &'static Port, shared: &'static Shared) {
 
 #[embassy_executor::task]
 async fn link(port: &'static Port, shared: &'static Shared, server: &'static SharedServer<FileFlash>) {
-    let answer = tasks::link(firmware::server::Line::Serial, &mut Receiver(&LINK), port, server, shared);
+    let mut receiver = Receiver(&LINK);
+    let answer = tasks::link(firmware::server::Line::Serial, &mut receiver, port, server, shared);
     select(answer, tasks::keep(server, shared)).await;
     // The answer is on its way out of the pipe.
     Timer::after_millis(20).await;

@@ -301,7 +301,9 @@ fn spawn(spawner: Spawner, start: &Start) -> Option<()> {
     let bus: &'static Bus = BUS.init(Mutex::new(can::Sender::new()));
     CONTROL.start(interrupt::UART5).spawn(control(shared).ok()?);
     // Without its crystal the clock is not exact enough for a bus that others use.
-    if start.crystal && let Some(receiver) = can::start(shared) {
+    if start.crystal
+        && let Some(receiver) = can::start(shared)
+    {
         spawner.spawn(bus_link(receiver, bus, shared, server).ok()?);
     }
     spawner.spawn(telemetry(port, bus, shared).ok()?);

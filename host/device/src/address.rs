@@ -91,7 +91,11 @@ fn on_bus(text: &str, rest: &str) -> Result<Address> {
             .help(format!("a device on a CAN bus is {SLCAN}, such as slcan:/dev/ttyACM0,address=2"))
     };
     let mut parts = rest.split(',');
-    let adapter: Address = parts.next().unwrap_or_default().parse().map_err(|_| wrong("the port names no CAN adapter".to_owned()))?;
+    let adapter: Address = parts
+        .next()
+        .unwrap_or_default()
+        .parse()
+        .map_err(|_| wrong("the port names no CAN adapter".to_owned()))?;
     if matches!(adapter, Address::Can { .. }) {
         return Err(wrong("the port names an adapter behind an adapter".to_owned()));
     }
@@ -102,15 +106,21 @@ fn on_bus(text: &str, rest: &str) -> Result<Address> {
             "address" if value == "all" => device = Some(None),
             "address" => {
                 let found = value.parse().ok().and_then(can::Address::new);
-                device = Some(Some(found.ok_or_else(|| wrong("the address on the bus is not 1 to 8, or all".to_owned()))?));
+                device = Some(Some(
+                    found.ok_or_else(|| wrong("the address on the bus is not 1 to 8, or all".to_owned()))?,
+                ));
             }
             "kbit" => {
                 let rate = value.parse().ok().filter(|rate| CanLine::RATES.contains(rate));
-                kbit_per_s = rate.ok_or_else(|| wrong("the bit rate of the bus is not 125, 250, 500 or 1000".to_owned()))?;
+                kbit_per_s = rate.ok_or_else(|| {
+                    wrong("the bit rate of the bus is not 125, 250, 500 or 1000".to_owned())
+                })?;
             }
             "baud" => {
                 let speed = value.parse().ok().filter(|speed| (300..=12_000_000).contains(speed));
-                baud = speed.ok_or_else(|| wrong("the speed of the adapter is not 300 to 12000000 baud".to_owned()))?;
+                baud = speed.ok_or_else(|| {
+                    wrong("the speed of the adapter is not 300 to 12000000 baud".to_owned())
+                })?;
             }
             _ => return Err(wrong(format!("`{part}` is not part of a port"))),
         }

@@ -9,12 +9,19 @@ use std::time::{Duration, Instant};
 use model_core::link::can::{self as codec, Format, Route, VENT};
 
 use super::Port;
+use super::line_activity::lost;
 use super::slcan::{self, Heard, Parser};
 use crate::error::DeviceCode;
 use pam_data::error::{Error, Result};
 
 /// How long an adapter may take to answer a line. Those that answer do so within some milliseconds; those that do not cost this time.
-const ANSWER: Duration = Duration::from_millis(150);
+const ANSWER: Duration = Duration::from_millis(200);
+/// A pause after which no more answers come to the line that closes the channel.
+const PAUSE: Duration = Duration::from_millis(50);
+/// Longest wait for such a pause: something else may be talking without end.
+const CLOSING: Duration = Duration::from_secs(1);
+/// Times that an adapter is asked to join the bus.
+const JOINS: u32 = 3;
 /// Messages that are given to an adapter at once: fewer than any keeps. Behind them it is left the time that they take on the bus, at up
 /// to 135 bits each.
 const BATCH: usize = 12;
@@ -30,6 +37,8 @@ pub(super) struct CanLine {
     /// Shared by all handles: the device sees one sender.
     sender: Arc<Mutex<codec::Sender>>,
     pending: VecDeque<u8>,
+    /// The last answer to a line, until it is taken.
+    answer: Option<Heard>,
     refused: u64,
     foreign: u64,
 }
@@ -45,58 +54,78 @@ impl CanLine {
             receiver: codec::Receiver::new(Format::Classic),
             sender: Arc::new(Mutex::new(codec::Sender::new(Format::Classic))),
             pending: VecDeque::new(),
+            answer: None,
             refused: 0,
             foreign: 0,
         };
-        // Ends what an earlier program left unfinished; a channel that is closed already refuses.
-        line.command("\r\r\rC\r")?;
-        line.command("\r")?;
-        let rate = line.command(slcan::bit_rate(kbit_per_s))?;
-        let opened = line.command("O\r")?;
-        let name = line.adapter.name();
-        if rate == Some(Heard::Refused) || opened == Some(Heard::Refused) {
-            let what = if rate == Some(Heard::Refused) {
-                format!("the CAN adapter refuses {kbit_per_s} kbit/s")
-            } else {
-                "the CAN adapter does not join the bus".to_owned()
-            };
-            return Err(Error::new(DeviceCode::DevicePort, what)
+        let name = line.adapter.name().to_owned();
+        for attempt in 1..=JOINS {
+            let (rate, opened) = line.join()?;
+            if rate == Some(Heard::Refused) || opened == Some(Heard::Refused) {
+                // A late answer to an earlier line may have been taken for this one's.
+                if attempt < JOINS {
+                    continue;
+                }
+                let what = if rate == Some(Heard::Refused) {
+                    format!("the CAN adapter refuses {kbit_per_s} kbit/s")
+                } else {
+                    "the CAN adapter does not join the bus".to_owned()
+                };
+                return Err(Error::new(DeviceCode::DevicePort, what)
+                    .value(name)
+                    .help("unplug the adapter and plug it in again; check that its bus has power"));
+            }
+            if line.foreign > 0 && rate.is_none() && opened.is_none() {
+                return Err(Error::new(
+                    DeviceCode::DeviceForeign,
+                    "what answers on this port is not a CAN adapter with the slcan protocol",
+                )
                 .value(name)
-                .help("unplug the adapter and plug it in again; check that its bus has power"));
+                .help("check the port; a controller's own serial port has no `slcan:` before it"));
+            }
+            break;
         }
-        if line.foreign > 0 && rate.is_none() && opened.is_none() {
-            return Err(Error::new(
-                DeviceCode::DeviceForeign,
-                "what answers on this port is not a CAN adapter with the slcan protocol",
-            )
-            .value(name)
-            .help("check the port; a controller's own serial port has no `slcan:` before it"));
-        }
-        line.refused = 0;
+        (line.refused, line.foreign) = (0, 0);
         Ok(line)
+    }
+
+    /// Closes the channel, sets its bit rate and opens it; gives the answers to the last two.
+    fn join(&mut self) -> Result<(Option<Heard>, Option<Heard>)> {
+        // Ends what an earlier program left unfinished. A channel that is closed already refuses; that answer comes before a pause.
+        self.command("\r\r\rC\r")?;
+        let deadline = Instant::now() + CLOSING;
+        while self.listen(PAUSE)? && Instant::now() < deadline {}
+        self.parser = Parser::default();
+        let rate = self.command(slcan::bit_rate(self.kbit_per_s))?;
+        Ok((rate, self.command("O\r")?))
     }
 
     /// Sends a line to the adapter and waits for its answer, if it gives any.
     fn command(&mut self, text: &str) -> Result<Option<Heard>> {
-        let gone = |port: &Port, e: &io::Error| super::line_activity::lost(port, e);
-        self.adapter.write_all(text.as_bytes()).map_err(|e| gone(&self.adapter, &e))?;
+        self.adapter.write_all(text.as_bytes()).map_err(|e| lost(&self.adapter, &e))?;
         let deadline = Instant::now() + ANSWER;
-        let mut answer = None;
+        self.answer = None;
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
-            if left.is_zero() || answer.is_some() {
-                return Ok(answer);
+            if left.is_zero() || self.answer.is_some() {
+                return Ok(self.answer.take());
             }
-            let mut bytes = [0; 256];
-            let count = self.adapter.read(&mut bytes, left).map_err(|e| gone(&self.adapter, &e))?;
-            for byte in &bytes[..count] {
-                match self.parser.push(*byte) {
-                    Some(said @ (Heard::Done | Heard::Refused)) => answer = Some(said),
-                    Some(Heard::Foreign) => self.foreign += 1,
-                    Some(Heard::Message(..) | Heard::PassedOver) | None => {}
-                }
+            self.listen(left)?;
+        }
+    }
+
+    /// Takes what the adapter says before it is asked to join; whether anything came.
+    fn listen(&mut self, patience: Duration) -> Result<bool> {
+        let mut bytes = [0; 256];
+        let count = self.adapter.read(&mut bytes, patience).map_err(|e| lost(&self.adapter, &e))?;
+        for byte in &bytes[..count] {
+            match self.parser.push(*byte) {
+                Some(said @ (Heard::Done | Heard::Refused)) => self.answer = Some(said),
+                Some(Heard::Foreign) => self.foreign += 1,
+                Some(Heard::Message(..) | Heard::PassedOver) | None => {}
             }
         }
+        Ok(count > 0)
     }
 
     /// The line to another device on the same bus.
@@ -116,6 +145,7 @@ impl CanLine {
             receiver: codec::Receiver::new(Format::Classic),
             sender: Arc::clone(&self.sender),
             pending: VecDeque::new(),
+            answer: None,
             refused: 0,
             foreign: 0,
         })
@@ -147,7 +177,9 @@ impl CanLine {
 
     fn take(&mut self, byte: u8) {
         match self.parser.push(byte) {
-            Some(Heard::Message(identifier, data)) if Route::of(identifier) == Some(Route::From(self.device)) => {
+            Some(Heard::Message(identifier, data))
+                if Route::of(identifier) == Some(Route::From(self.device)) =>
+            {
                 self.pending.extend(self.receiver.take(&data));
             }
             Some(Heard::Refused) => self.refused += 1,

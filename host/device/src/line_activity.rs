@@ -76,8 +76,14 @@ impl LineActivity {
 fn silent_bus(port: &Port, (refused, foreign): (u64, u64)) -> Error {
     let cause = match (refused, foreign) {
         (0, 0) => "nothing answers at this address of the CAN bus".to_owned(),
-        (0, _) => format!("no device answers, and the CAN adapter sends {} that it should not", pluralise(foreign as usize, "line")),
-        _ => format!("no device answers, and the CAN adapter refuses {}", pluralise(refused as usize, "message")),
+        (0, _) => format!(
+            "no device answers, and the CAN adapter sends {} that it should not",
+            pluralise(foreign as usize, "line")
+        ),
+        _ => format!(
+            "no device answers, and the CAN adapter refuses {}",
+            pluralise(refused as usize, "message")
+        ),
     };
     Error::new(DeviceCode::DeviceSilent, cause).value(port.name()).help(
         "check `can.address` and `can.kbit_per_s` of the controller over its serial port, that the bus has 120 Ω at both ends, and that CANH \

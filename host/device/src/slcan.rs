@@ -75,7 +75,9 @@ fn heard(line: &[u8]) -> Heard {
     match line {
         [] | [b'z' | b'Z'] => Heard::Done,
         [b't', rest @ ..] => message(rest).unwrap_or(Heard::Foreign),
-        [first, ..] if line.len() <= LONGEST && line.is_ascii() && PASSED_OVER.contains(first) => Heard::PassedOver,
+        [first, ..] if line.len() <= LONGEST && line.is_ascii() && PASSED_OVER.contains(first) => {
+            Heard::PassedOver
+        }
         _ => Heard::Foreign,
     }
 }
@@ -145,30 +147,46 @@ mod tests {
     fn what_an_adapter_says_besides_is_told_apart() {
         let said = all(b"\rz\r\x07V1013\rT000000801AA\rt10\x07t2011FF\n\r");
         let message = Heard::Message(0x201, vec![0xFF]);
-        assert_eq!(said, [
-            Heard::Done,
-            Heard::Done,
-            Heard::Refused,
-            Heard::PassedOver,
-            Heard::PassedOver,
-            Heard::Refused,
-            message
-        ]);
+        assert_eq!(
+            said,
+            [
+                Heard::Done,
+                Heard::Done,
+                Heard::Refused,
+                Heard::PassedOver,
+                Heard::PassedOver,
+                Heard::Refused,
+                message
+            ]
+        );
     }
 
     #[test]
     fn a_line_that_is_no_message_is_none() {
         for line in [
-            "t", "t1", "t101", "t1019", "t101F0011223344556677", "t1012AA", "t1011AABB", "t1011AA123", "t1011GG", "t8010", "tFFF0",
-            "t101-1", "hello", "login: ", "t1011\u{e9}",
+            "t",
+            "t1",
+            "t101",
+            "t1019",
+            "t101F0011223344556677",
+            "t1012AA",
+            "t1011AABB",
+            "t1011AA123",
+            "t1011GG",
+            "t8010",
+            "tFFF0",
+            "t101-1",
+            "hello",
+            "login: ",
+            "t1011\u{e9}",
         ] {
             assert_eq!(all(format!("{line}\r").as_bytes()), [Heard::Foreign], "{line}");
         }
         let endless = "t1011AA".repeat(100);
-        assert_eq!(all(format!("{endless}\rt2010\r").as_bytes()), [
-            Heard::Foreign,
-            Heard::Message(0x201, Vec::new())
-        ]);
+        assert_eq!(
+            all(format!("{endless}\rt2010\r").as_bytes()),
+            [Heard::Foreign, Heard::Message(0x201, Vec::new())]
+        );
     }
 
     #[test]

@@ -4,8 +4,8 @@ use clap::Args;
 use model_core::link::messages::State;
 use pam_data::error::{Error, Result};
 use pam_device::error::DeviceCode;
-use pam_device::{Address, messages, vent_all};
 use pam_device::run::vent;
+use pam_device::{Address, messages, vent_all};
 
 use super::port::PortOption;
 use crate::console::Console;
@@ -13,7 +13,9 @@ use crate::documents::{device, line};
 
 /// Arguments of `host vent`.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  host vent --port /dev/ttyACM0\n  host vent --json\n  host vent --port slcan:/dev/ttyACM0,address=all")]
+#[command(
+    after_help = "Examples:\n  host vent --port /dev/ttyACM0\n  host vent --json\n  host vent --port slcan:/dev/ttyACM0,address=all"
+)]
 pub struct Arguments {
     #[command(flatten)]
     port: PortOption,
@@ -60,7 +62,11 @@ impl Arguments {
                 .help("shut off the air supply of the muscles by hand"));
         }
         console.result(if self.json {
-            line(&device::Vent { schema: "pam-vent/1", vented: true, state: messages::state(State::Disarmed) })?
+            line(&device::Vent {
+                schema: "pam-vent/1",
+                vented: true,
+                state: messages::state(State::Disarmed),
+            })?
         } else {
             format!("vented; these addresses answer: {}", list(true))
         });

@@ -94,8 +94,16 @@ struct Adapter {
     is_open: bool,
 }
 
-const NOISE: [&str; 8] =
-    ["t2019AA\r", "T000002018AABB\r", "t201\r", "\x07", "r2010\r", "F00\r", "\u{fffd}\u{1}t201811\r", "V1013\r"];
+const NOISE: [&str; 8] = [
+    "t2019AA\r",
+    "T000002018AABB\r",
+    "t201\r",
+    "\x07",
+    "r2010\r",
+    "F00\r",
+    "\u{fffd}\u{1}t201811\r",
+    "V1013\r",
+];
 
 impl Adapter {
     fn answer(&mut self, text: &str) {
@@ -116,7 +124,9 @@ impl Adapter {
             }
             (_, [b't', ..]) => {
                 let mut said = line.iter().chain(b"\r").filter_map(|byte| self.parser.push(*byte));
-                let Some(Heard::Message(identifier, data)) = said.next() else { panic!("a message: {line:?}") };
+                let Some(Heard::Message(identifier, data)) = said.next() else {
+                    panic!("a message: {line:?}")
+                };
                 drop(said);
                 assert!(self.is_open, "the channel is open");
                 if self.vice == Vice::RefusesMessages {
@@ -299,6 +309,7 @@ fn an_address_where_nobody_is_and_an_adapter_that_refuses_are_told_in_words() {
     let error = told(&Bus::new(1, Vice::Login), "1");
     assert_eq!(error.code(), DeviceCode::DeviceForeign);
     assert!(error.cause().contains("not a CAN adapter"), "{error}");
-    let error = Port::open(&"slcan:/dev/no-such-device,address=1".parse().expect("an address")).expect_err("no port");
+    let error =
+        Port::open(&"slcan:/dev/no-such-device,address=1".parse().expect("an address")).expect_err("no port");
     assert_eq!(error.code(), DeviceCode::DevicePort);
 }

@@ -190,13 +190,19 @@ pub fn start(shared: &'static Shared) -> Option<Receiver> {
     FMR.write(FMR.read() & !1);
     IER.write(INTERRUPTS);
     MCR.write(OPERATE);
-    Some(Receiver { codec: codec::Receiver::new(Format::Classic), rest: [0; CLASSIC], at: 0, length: 0, shared })
+    Some(Receiver {
+        codec: codec::Receiver::new(Format::Classic),
+        rest: [0; CLASSIC],
+        at: 0,
+        length: 0,
+        shared,
+    })
 }
 
-/// Drops what waits to be sent.
+/// Drops what waits to be sent: first the queue, from which the interrupt would fill the mailboxes again.
 fn drop_waiting() {
-    TSR.write(GIVE_UP);
     WAITING.clear();
+    TSR.write(GIVE_UP);
 }
 
 /// Looks after the bus, without end: what nobody takes is dropped.

@@ -25,8 +25,7 @@ fn arrived<'a>(
     format: Format,
     messages: impl IntoIterator<Item = &'a Message>,
 ) -> (Vec<(u16, usize)>, Counts) {
-    let (mut receiver, mut accumulator, mut frames) =
-        (Receiver::new(format), Accumulator::new(), Vec::new());
+    let (mut receiver, mut accumulator, mut frames) = (Receiver::new(format), Accumulator::new(), Vec::new());
     for message in messages {
         for byte in receiver.take(message) {
             if let Some(Ok(frame)) = accumulator.push(byte) {
