@@ -1,16 +1,17 @@
 //! Criteria as data: a number that decides, with its symbol, unit, value, statistical meaning and source.
 //!
 //! The macro [`criteria!`](crate::criteria!) declares the criteria of one stage as constants and as rows of the page that
-//! `cargo run -p pam-diagnose --example criteria` prints. A sensitivity study scales one criterion at compile time, so that no setting of
-//! a running program can change an answer:
+//! `cargo run -p pam-diagnose --example criteria` prints. No setting of a running program can change them. Only a program built with
+//! `--cfg pam_study`, for a study of how much the answers depend on each criterion, reads one factor from its environment:
 //!
 //! ```text
-//! PAM_CRITERION=FAMILY_ALPHA PAM_CRITERION_FACTOR=0.5 cargo build --release -p host
+//! RUSTFLAGS='--cfg pam_study' cargo build --release -p host --target-dir STUDY
+//! PAM_CRITERION=FAMILY_ALPHA PAM_CRITERION_FACTOR=0.5 STUDY/release/host diagnose …
 //! ```
 
-mod scaling;
-
-pub use scaling::{count, number};
+#[cfg(pam_study)]
+#[doc(hidden)]
+pub mod study;
 
 /// Where the value of a criterion comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +62,8 @@ pub struct Criterion {
     pub meaning: &'static str,
     /// Where the value comes from.
     pub source: Source,
+    /// Whether a study can scale it: not the sizes of arrays, and not lists.
+    pub scalable: bool,
 }
 
 /// The criteria of one stage.
@@ -72,14 +75,18 @@ pub struct Stage {
     pub criteria: &'static [Criterion],
 }
 
-/// Declares the criteria of a stage as constants and as rows of the page.
+/// Declares the criteria of a stage as constants and as rows of the page. A type in parentheses is not scaled by a study: lists, and
+/// numbers that are the size of an array.
 #[macro_export]
 macro_rules! criteria {
     ($title:literal: $($(#[doc = $meaning:literal])+ $name:ident: $type:tt = $value:expr, $symbol:literal, $unit:literal, $source:expr;)+) => {
         use $crate::criteria::Source::{self, *};
         $(
             $(#[doc = $meaning])+
-            pub(crate) const $name: $crate::criteria!(@type $type) = $crate::criteria!(@value $type, $name, $value);
+            #[cfg(not(pam_study))]
+            pub(crate) const $name: $crate::criteria!(@type $type) = $value;
+            #[cfg(pam_study)]
+            $crate::criteria!(@study $type, $name, $value);
         )+
         /// This stage's part of the page.
         pub(crate) const STAGE: $crate::criteria::Stage = $crate::criteria::Stage {
@@ -91,17 +98,38 @@ macro_rules! criteria {
                 value: stringify!($value),
                 meaning: concat!($($meaning),+),
                 source: { const SOURCE: Source = $source; SOURCE },
+                scalable: $crate::criteria!(@scalable $type),
             }),+],
         };
     };
+    (@scalable f64) => { true };
+    (@scalable usize) => { true };
+    (@scalable $other:tt) => { false };
     (@type f64) => { f64 };
     (@type usize) => { usize };
     (@type u32) => { u32 };
     (@type $other:tt) => { $crate::criteria!(@grouped $other) };
     (@grouped ($($inner:tt)+)) => { $($inner)+ };
-    (@value f64, $name:ident, $value:expr) => { $crate::criteria::number(stringify!($name), $value) };
-    (@value usize, $name:ident, $value:expr) => { $crate::criteria::count(stringify!($name), $value) };
-    (@value $other:tt, $name:ident, $value:expr) => { $value };
+    (@study f64, $name:ident, $value:expr) => {
+        $crate::criteria!(@cell f64, $name, ::std::sync::atomic::AtomicU64::new(f64::to_bits($value)));
+    };
+    (@study usize, $name:ident, $value:expr) => {
+        $crate::criteria!(@cell usize, $name, ::std::sync::atomic::AtomicUsize::new($value));
+    };
+    (@study $other:tt, $name:ident, $value:expr) => { pub(crate) const $name: $crate::criteria!(@type $other) = $value; };
+    // A constant whose value the compiler does not know: declared here, defined below, and scaled before `main`.
+    (@cell $type:ident, $name:ident, $cell:expr) => {
+        unsafe extern "C" { pub(crate) safe static $name: $type; }
+        const _: () = {
+            type Cell = <$type as $crate::criteria::study::Scaled>::Cell;
+            #[unsafe(export_name = stringify!($name))]
+            static CELL: Cell = $cell;
+            extern "C" fn scale() { <$type as $crate::criteria::study::Scaled>::scale(stringify!($name), &CELL) }
+            #[used]
+            #[unsafe(link_section = ".init_array")]
+            static BEFORE_MAIN: extern "C" fn() = scale;
+        };
+    };
 }
 
 /// Stages as Markdown tables.

@@ -114,6 +114,10 @@ pub struct Asking {
     pub limit: Duration,
     /// Trials that are not begun by then stay unanswered.
     pub until: Option<Instant>,
+    /// Whether diagnosed tables are asked for, where the tool makes them.
+    pub tables: bool,
+    /// Variables of the tool's environment.
+    pub environment: Vec<(&'static str, String)>,
 }
 
 /// A line of `frozen.jsonl`: an answer's hash, written as soon as the answer is there, so that a run that was interrupted can go
@@ -200,7 +204,8 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
         // What an earlier run left must not pass for an answer.
         let _ = (std::fs::remove_file(&json), std::fs::remove_file(&table));
         let mut command = tool::diagnose(&how.host, &trial.join("muscle.toml"), &recordings(&trial), &json);
-        if help.tables {
+        command.envs(how.environment.iter().map(|(name, value)| (name, value)));
+        if how.tables && help.tables {
             command.arg("-o").arg(&table);
         }
         if help.checks {

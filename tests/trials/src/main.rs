@@ -109,6 +109,8 @@ impl Tool {
             host: self.host.clone(),
             limit: Duration::from_secs(self.limit),
             until: self.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0))),
+            tables: true,
+            environment: Vec::new(),
         }
     }
 }

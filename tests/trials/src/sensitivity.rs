@@ -1,7 +1,7 @@
-//! How much the answers depend on each criterion: the trials of a development set, answered by builds in which one criterion is scaled.
+//! How much the answers depend on each criterion: the trials of a development set, answered with one criterion scaled at a time.
 //!
-//! The factor is compiled in (`PAM_CRITERION`, see `pam_data::criteria`), so each row of the table needs a build of its own. A study is
-//! continued where an earlier run stopped; the page lists what has not been measured, too.
+//! A release has its criteria as constants. The study builds the program once with `--cfg pam_study`, in which each run can scale one of
+//! them (see `pam_data::criteria`). A study is continued where an earlier run stopped; the page lists what has not been measured, too.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -34,6 +34,9 @@ pub struct Study {
     /// Longest time for one answer, s.
     #[arg(long, default_value_t = 300)]
     limit: u64,
+    /// The program built earlier with `--cfg pam_study`; it is built in the output directory otherwise.
+    #[arg(long)]
+    host: Option<PathBuf>,
     /// Begin no further row after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
@@ -101,41 +104,38 @@ fn folder(criterion: &str, factor: f64) -> String {
 /// Whether a factor is applied to it, and the trials can tell.
 fn decides(stage: &str, c: &Criterion) -> bool {
     let other = OTHER_DATA.iter().any(|s| stage.to_lowercase().contains(s));
-    !other && c.source != Source::Cost && !c.value.starts_with('[') && !c.value.starts_with('(')
+    !other && c.source != Source::Cost && c.scalable
 }
 
+/// The last stages first: they turn evidence into names.
 fn all_that_decide() -> Vec<String> {
     let of = |s: &'static pam_diagnose::criteria::Stage| {
         s.criteria.iter().filter(|c| decides(s.title, c)).map(|c| c.name.to_owned())
     };
-    PAGE.iter().flat_map(of).collect()
+    PAGE.iter().rev().flat_map(of).collect()
 }
 
-/// The program with one criterion scaled. The packages are those of the usual build, so that the features of dependencies agree.
-fn build(output: &Path, scaled: Option<(&str, f64)>) -> Result<PathBuf, Box<dyn Error>> {
+/// The program whose criteria can be scaled. The packages are those of the usual build, so that the features of dependencies agree.
+fn build(output: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let target = output.join("build");
     let mut cargo = Command::new("cargo");
-    cargo.args([
-        "build",
-        "--quiet",
-        "--release",
-        "--locked",
-        "-p",
-        "trials",
-        "-p",
-        "host",
-        "--bin",
-        "host",
-        "--target-dir",
-    ]);
-    cargo.arg(&target).env_remove("PAM_CRITERION").env_remove("PAM_CRITERION_FACTOR");
-    if let Some((criterion, factor)) = scaled {
-        cargo.env("PAM_CRITERION", criterion).env("PAM_CRITERION_FACTOR", factor.to_string());
-    }
+    cargo.args(["build", "--quiet", "--release", "--locked", "--workspace", "--bin", "host", "--target-dir"]);
+    let flags = std::env::var("RUSTFLAGS").unwrap_or_default();
+    cargo.arg(&target).env("RUSTFLAGS", format!("{flags} --cfg pam_study"));
     if !cargo.status()?.success() {
-        return Err(format!("the build with {scaled:?} failed").into());
+        return Err("the build for the study failed".into());
     }
     Ok(target.join("release/host"))
+}
+
+/// The environment in which the study's program scales one criterion. Its threads are left to the trials beside it.
+fn environment(criterion: &str, factor: f64) -> Vec<(&'static str, String)> {
+    let mut all = vec![("RAYON_NUM_THREADS", "1".to_owned())];
+    if factor != 1.0 {
+        all.push(("PAM_CRITERION", criterion.to_owned()));
+        all.push(("PAM_CRITERION_FACTOR", factor.to_string()));
+    }
+    all
 }
 
 /// A folder that shares the set's trials and truths and has answers of its own.
@@ -171,18 +171,18 @@ fn outcomes(dir: &Path) -> Result<Vec<Outcome>, Box<dyn Error>> {
 }
 
 /// One row of the table; read again where it has been measured.
-fn measure(study: &Study, criterion: &str, factor: f64) -> Result<Row, Box<dyn Error>> {
+fn measure(study: &Study, host: &Path, criterion: &str, factor: f64) -> Result<Row, Box<dyn Error>> {
     let dir = study.output.join(folder(criterion, factor));
     let kept = dir.join("row.json");
     if let Ok(text) = std::fs::read_to_string(&kept) {
         return Ok(serde_json::from_str(&text)?);
     }
     let start = Instant::now();
-    let host = build(&study.output, (factor != 1.0).then_some((criterion, factor)))?;
     share(&study.set, &dir)?;
     let limit = Duration::from_secs(study.limit);
     if ledger::read_ledger(&dir)?.answers.is_empty() {
-        answer::ask(&dir, &Asking { host, limit, until: None })?;
+        let environment = environment(criterion, factor);
+        answer::ask(&dir, &Asking { host: host.to_owned(), limit, until: None, tables: false, environment })?;
     }
     let row = Row::of(criterion, factor, &outcomes(&dir)?);
     std::fs::write(&kept, serde_json::to_string_pretty(&row)?)?;
@@ -208,7 +208,12 @@ fn known(names: &[String]) -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// The table of all rows that have been measured, and the list of the others.
+/// A criterion as the page of criteria has it.
+fn criterion(name: &str) -> Option<&'static Criterion> {
+    PAGE.iter().flat_map(|s| s.criteria).find(|c| c.name == name)
+}
+
+/// The table of all criteria that change an answer, those that change none, and those that have not been measured.
 fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
     let mut m = String::from(
         "# Sensitivity of the diagnosis to its criteria\n\n\
@@ -216,10 +221,11 @@ fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
          virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and more whose first name is of the right class. \
          \"Answers changed\" counts trials that name something else than with the criteria as they are.\n\n\
          ```text\n\
-         cargo run --release -p trials -- generate --set dev --n 66 -o SET\n\
+         cargo run --release -p trials -- generate --set dev -o SET\n\
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
-         wrote this page.\n\n",
+         These commands wrote this page. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
+         on each of them, not how good they are.\n\n",
     );
     let rate = |k: usize, n: usize| Rate::new(k, n).to_string();
     let _ = writeln!(
@@ -232,15 +238,19 @@ fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
         nominal.named.len()
     );
     m.push_str(
-        "| criterion | false alarms at ½, ×2 | class right at ½, ×2 | exact at ½, ×2 | wrong class at ½, ×2 | answers changed at ½, ×2 |\n\
-         | --- | --- | --- | --- | --- | --- |\n",
+        "| criterion | value | false alarms at ½, ×2 | class right at ½, ×2 | exact at ½, ×2 | wrong class at ½, ×2 | answers changed at ½, ×2 |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
     );
-    for (half, double) in rows {
+    let (mut moving, still): (Vec<_>, Vec<_>) =
+        rows.iter().partition(|(half, double)| half.changed(nominal) + double.changed(nominal) > 0);
+    moving.sort_by_key(|(half, double)| std::cmp::Reverse(half.changed(nominal) + double.changed(nominal)));
+    for (half, double) in moving {
         let pair = |of: &dyn Fn(&Row) -> usize| format!("{}, {}", of(half), of(double));
         let _ = writeln!(
             m,
-            "| `{}` | {} | {} | {} | {} | {} |",
+            "| `{}` | {} | {} | {} | {} | {} | {} |",
             half.criterion,
+            criterion(&half.criterion).map_or("", |c| c.value),
             pair(&|r| r.false_alarms),
             pair(&|r| r.class_right),
             pair(&|r| r.exact),
@@ -248,13 +258,18 @@ fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
             pair(&|r| r.changed(nominal))
         );
     }
-    if !open.is_empty() {
-        let names: Vec<String> = open.iter().map(|n| format!("`{n}`")).collect();
-        let _ = writeln!(m, "\nNot measured yet: {}.", names.join(", "));
+    let names = |of: Vec<&str>| of.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+    let still: Vec<&str> = still.iter().map(|(half, _)| half.criterion.as_str()).collect();
+    let _ = writeln!(m, "\n{} of {} criteria measured change no answer.", still.len(), rows.len());
+    for (what, of) in [("Without effect", still), ("Not measured", open.iter().map(String::as_str).collect())]
+    {
+        if !of.is_empty() {
+            let _ = writeln!(m, "\n{what} ({}): {}.", of.len(), names(of));
+        }
     }
     m.push_str(
-        "\nNot in this study: limits of computing time, and the criteria of comparisons with a reference, of campaigns over months, of \
-         isometric runs and of proposed recordings. Loops of the virtual bench do not reach them.\n",
+        "\nNot in this study: limits of computing time, sizes of arrays, and the criteria of comparisons with a reference, of campaigns \
+         over months, of isometric runs and of proposed recordings. Loops of the virtual bench do not reach them.\n",
     );
     m
 }
@@ -264,7 +279,11 @@ pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
     known(&study.criterion)?;
     let until = study.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
     std::fs::create_dir_all(&study.output)?;
-    let nominal = measure(study, "nominal", 1.0)?;
+    let host = study.host.clone().map_or_else(|| build(&study.output), Ok)?;
+    let nominal = measure(study, &host, "nominal", 1.0)?;
+    if ledger::read_ledger(&study.output.join(folder("nominal", 1.0)))?.tool != answer::version(&host) {
+        return Err("this study was begun with another program; name that one with --host, or choose another output directory".into());
+    }
     let mut wanted = study.criterion.clone();
     let rest = all_that_decide();
     wanted.extend(rest.into_iter().filter(|n| !study.criterion.contains(n)));
@@ -276,7 +295,7 @@ pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
             open.push(name.clone());
             continue;
         }
-        rows.push((measure(study, name, FACTORS[0])?, measure(study, name, FACTORS[1])?));
+        rows.push((measure(study, &host, name, FACTORS[0])?, measure(study, &host, name, FACTORS[1])?));
     }
     let page = markdown(&nominal, &rows, &open);
     std::fs::write(study.output.join("sensitivity.md"), &page)?;
@@ -314,9 +333,12 @@ mod tests {
             named: named.iter().map(|n| vec![(*n).to_owned()]).collect(),
         };
         let nominal = row("nominal", 1.0, ["leak", "inertia"]);
-        let rows = [(row("ALPHA", 0.5, ["leak", "backlash"]), row("ALPHA", 2.0, ["leak", "inertia"]))];
+        let rows = [
+            (row("ALPHA", 0.5, ["leak", "backlash"]), row("ALPHA", 2.0, ["leak", "inertia"])),
+            (row("GAMMA", 0.5, ["leak", "inertia"]), row("GAMMA", 2.0, ["leak", "inertia"])),
+        ];
         let page = markdown(&nominal, &rows, &["BETA".into()]);
-        assert!(page.contains("| `ALPHA` | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
-        assert!(page.contains("Not measured yet: `BETA`."), "{page}");
+        assert!(page.contains("| `ALPHA` |  | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
+        assert!(page.contains("Without effect (1): `GAMMA`.") && page.contains("(1): `BETA`."), "{page}");
     }
 }

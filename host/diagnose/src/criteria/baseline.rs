@@ -5,9 +5,9 @@ pam_data::criteria! {
     /// Elastic orders of the production table.
     TABLE_ORDER: usize = 4, "M", "1", Trials("four orders leave 0.03 to 0.06 % of the blocked force on a hyperelastic wall");
     /// The highest elastic order that is ever offered.
-    ORDERS: usize = 6, "M_max", "1", Judgement;
+    ORDERS: (usize) = 6, "M_max", "1", Judgement;
     /// Columns of a hyperelastic (Yeoh) wall.
-    YEOH: usize = 3, "n_Y", "1", Published("O. H. Yeoh, Rubber Chemistry and Technology 66 (1993) 754-771, doi 10.5254/1.3538343");
+    YEOH: (usize) = 3, "n_Y", "1", Published("O. H. Yeoh, Rubber Chemistry and Technology 66 (1993) 754-771, doi 10.5254/1.3538343");
     /// A direction of the flexible tables counts where it differs from the others by this share of itself.
     DISTINCT_DIRECTION: f64 = 1e-3, "d_soft", "1", Judgement;
     /// A column that differs from a basis by less than this share of itself lies in it.

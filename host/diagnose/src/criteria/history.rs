@@ -143,7 +143,7 @@ pam_data::criteria! {
     /// Nodes of a table of held lengths over the pressures that pull.
     HELD_NODES: usize = 10, "n_node", "1", Derived("a knee of 60 kPa among 600 kPa; the penalties decide, not their number");
     /// Most elastic coefficients of it.
-    HELD_ORDER: usize = 4, "M", "1", Derived("the base model's order");
+    HELD_ORDER: (usize) = 4, "M", "1", Derived("the base model's order");
     /// Weights of second differences of its curves that are tried, per point.
     HELD_SMOOTHNESS: ([f64; 5]) = [1e-3, 1e-2, 1e-1, 1.0, 10.0], "lambda_2", "1", Derived("chosen by leaving out runs");
     /// Weights of first differences, as shares of those: a wall of one material has moduli that do not depend on pressure.

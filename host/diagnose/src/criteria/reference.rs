@@ -21,9 +21,9 @@ pam_data::criteria! {
     /// The turn stands after the last row within this share of the range of the extremum, so that a hold keeps its direction.
     TURN_HOLD: f64 = 0.01, "turn_hold", "1", Judgement;
     /// Pressure bins of a point: finer than any curve needs, coarser than rows.
-    POINT_BINS: usize = 64, "point_bins", "1", Judgement;
+    POINT_BINS: (usize) = 64, "point_bins", "1", Judgement;
     /// Intervals of the reference spline over the pressure range.
-    SPLINE_INTERVALS: usize = 14, "spline_intervals", "1", Judgement;
+    SPLINE_INTERVALS: (usize) = 14, "spline_intervals", "1", Judgement;
     /// Factor of the penalty on the gap between the directions: it is smoother than the curve.
     GAP_PENALTY: f64 = 10.0, "gap_penalty", "1", Judgement;
     /// Ridge on the gap, which decides where one direction has no data.
@@ -37,7 +37,7 @@ pam_data::criteria! {
     /// AFTER may reach this share of the range beyond BEFORE's pressures; the rest is not comparable.
     BEYOND: f64 = 0.05, "beyond", "1", Judgement;
     /// Residual cells per direction.
-    CELLS: usize = 6, "cells", "1", Judgement;
+    CELLS: (usize) = 6, "cells", "1", Judgement;
     /// Strokes nearer than this are one mounting (tape measure).
     SAME_STROKE: f64 = 1e-3, "same_stroke", "m", Convention("tape measure, 1 mm");
     /// Lengths of the reference from which on the force between two of them is interpolated: fewer do not show an error.
@@ -156,7 +156,7 @@ pam_data::criteria! {
     /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
     LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;
     /// Strokes: bins over the middle of the stroke.
-    STROKE_BINS: usize = 6, "stroke_bins", "1", Judgement;
+    STROKE_BINS: (usize) = 6, "stroke_bins", "1", Judgement;
     /// Share of the stroke left out at either end.
     STROKE_ENDS: f64 = 0.15, "stroke_ends", "1", Judgement;
     /// Rows slower than this share of the 70th percentile of speed are left out: turns and holds.
