@@ -131,7 +131,7 @@ impl Shared {
         self.bus_offs.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Vents and disarms, whoever owns the device: the message to all devices of a bus. In a fault the device stays there, vented.
+    /// Vents and disarms, also for those who do not own the device: the message to all devices of a bus. In a fault the device stays there, vented.
     pub fn vent(&self) {
         self.with(|controller| {
             // As the requests `stop` and `disarm`, whose refusals name the fault in which nothing more is to be done.

@@ -37,7 +37,7 @@ class Bus:
         self.chip, self.rate = chip, kbit_per_s * 1e3
         self.chips, self.hosts = [], []
         self.busy, self.free = False, 0.0
-        # Called with the identifier and the data of each message: whether it reaches nobody, or is destroyed by an error.
+        # Called with the identifier and the data of each message: whether it reaches no one, or is destroyed by an error.
         self.is_lost = self.is_destroyed = lambda identifier, data: False
         self.log = []
         self.add(chip)

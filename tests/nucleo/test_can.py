@@ -172,7 +172,7 @@ class Ownership(unittest.TestCase):
 class VentAll(unittest.TestCase):
     def test_one_message_vents_within_a_tick_although_answers_wait_and_frames_are_on_their_way(self):
         board = running()
-        # A long request that nobody finishes, and telemetry that fills the bus.
+        # A long request that no one finishes, and telemetry that fills the bus.
         board.link.ask(TELEMETRY, varint(1))
         board.run(0.05)
         board.line.send(bytes([1]) * 300)

@@ -83,7 +83,7 @@ impl Address {
     }
 }
 
-/// What stands behind `slcan:`.
+/// The device that the text after `slcan:` names.
 fn on_bus(text: &str, rest: &str) -> Result<Address> {
     let wrong = |cause: String| {
         Error::new(DataCode::CallInvalid, cause)

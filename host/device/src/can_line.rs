@@ -20,9 +20,9 @@ const ANSWER: Duration = Duration::from_millis(200);
 const PAUSE: Duration = Duration::from_millis(50);
 /// Longest wait for such a pause: something else may be talking without end.
 const CLOSING: Duration = Duration::from_secs(1);
-/// Times that an adapter is asked to join the bus.
+/// Attempts to join the bus.
 const JOINS: u32 = 3;
-/// Messages that are given to an adapter at once: fewer than any keeps. Behind them it is left the time that they take on the bus, at up
+/// Messages that are given to an adapter together: fewer than any keeps. Behind them it is left the time that they take on the bus, at up
 /// to 135 bits each.
 const BATCH: usize = 12;
 const MESSAGE_BITS: u32 = 135;
@@ -114,7 +114,7 @@ impl CanLine {
         }
     }
 
-    /// Takes what the adapter says before it is asked to join; whether anything came.
+    /// Takes what the adapter says before it joins the bus; whether anything came.
     fn listen(&mut self, patience: Duration) -> Result<bool> {
         let mut bytes = [0; 256];
         let count = self.adapter.read(&mut bytes, patience).map_err(|e| lost(&self.adapter, &e))?;

@@ -77,7 +77,7 @@ fn silent_bus(port: &Port, (refused, foreign): (u64, u64)) -> Error {
     let cause = match (refused, foreign) {
         (0, 0) => "nothing answers at this address of the CAN bus".to_owned(),
         (0, _) => format!(
-            "no device answers, and the CAN adapter sends {} that it should not",
+            "no device answers, and the CAN adapter sends {} that mean nothing",
             pluralise(foreign as usize, "line")
         ),
         _ => format!(

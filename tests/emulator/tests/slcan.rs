@@ -31,7 +31,7 @@ enum Vice {
     None,
     /// It never answers a line.
     Mute,
-    /// Every so many messages of the device are lost.
+    /// Every n-th message of the device is lost.
     Loses(u32),
     /// Between the lines there are others that mean nothing, of every kind.
     Chatters,
@@ -46,7 +46,7 @@ enum Vice {
 struct Node {
     place: Place,
     stream: TcpStream,
-    /// Vents as the firmware's interrupt does, by the requests that it stands for.
+    /// Vents as the firmware's interrupt does, by the requests that it replaces.
     to: Receiver,
     from: Sender,
 }

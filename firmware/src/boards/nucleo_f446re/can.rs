@@ -6,11 +6,11 @@
 //! | messages | controller | handled |
 //! | --- | --- | --- |
 //! | to this address | first FIFO | put into a queue for the link's task |
-//! | to all | second FIFO | in the interrupt: vents, whatever the link is doing |
+//! | to all | second FIFO | in the interrupt: vents, also while the link is busy |
 //! | all others | filtered out | |
 //!
-//! What waits to be sent is dropped when the controller is off the bus, and when nothing has gone out for [`STALLED_US`], because nobody
-//! is there: a host that comes back must not be given old answers. After a bus-off the controller comes back by itself, when it has seen
+//! What waits to be sent is dropped when the controller is off the bus, and when nothing has gone out for [`STALLED_US`], because no one
+//! is there: a host that comes back must not be given old answers. After a bus-off the controller comes back on its own, when it has seen
 //! the bus at rest 128 times for 11 bits (ABOM).
 
 use core::cell::Cell;
@@ -65,7 +65,7 @@ const fn filter(bank: usize, word: usize) -> Register {
     Register::at(CAN1 + 0x240 + 8 * bank + 4 * word)
 }
 
-/// In MCR: no sleep; mailboxes in the order of their requests, the oldest messages of a full FIFO stay, back from bus-off by itself.
+/// In MCR: no sleep; mailboxes in the order of their requests, the oldest messages of a full FIFO stay, back from bus-off on its own.
 const INITIALISE: u32 = 1 << 0;
 const OPERATE: u32 = 1 << 6 | 1 << 3 | 1 << 2;
 const INITIALISED: u32 = 1 << 0;
@@ -205,7 +205,7 @@ fn drop_waiting() {
     TSR.write(GIVE_UP);
 }
 
-/// Looks after the bus, without end: what nobody takes is dropped.
+/// Looks after the bus, without end: what no one takes is dropped.
 pub async fn supervise() {
     loop {
         Timer::after_millis(20).await;
@@ -254,7 +254,7 @@ unsafe fn CAN1_RX0() {
     }
 }
 
-/// Messages to all: vents at once.
+/// Messages to all: vents immediately.
 #[interrupt]
 unsafe fn CAN1_RX1() {
     note_overrun(1);

@@ -132,7 +132,7 @@ impl Bus {
     }
 }
 
-/// Both requests in one message, which nothing can interrupt; on classic CAN the one that stands for them.
+/// Both requests in one message, which nothing can interrupt; on classic CAN the one in their place.
 fn vent_message(bus: &mut Bus, format: Format) -> Message {
     let mut wire = [0; MAX_WIRE];
     let mut length = 0;

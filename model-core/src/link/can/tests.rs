@@ -94,7 +94,7 @@ fn each_is_lost(format: Format) {
             lost < before
         });
         let (frames, counts) = arrived(format, rest);
-        // The zero behind a gap stands for a closing zero that was alone in its message.
+        // The zero behind a gap is as good as a closing zero that was alone in its message.
         let whole = sent.iter().flatten().nth(lost).is_some_and(|message| message[format.head()..] == [0]);
         assert_eq!(frames, expected(its.filter(|_| !whole)), "message {lost}");
         // The last one of all is not missed.
