@@ -133,7 +133,7 @@ static inline const uint8_t *pam_unframe(uint8_t *bytes, size_t length, uint8_t 
 }
 
 #define PAM_LINK_VERSION 6
-#define PAM_SCHEMA_HASH UINT64_C(0xb818ffa881a7cd33)
+#define PAM_SCHEMA_HASH UINT64_C(0xe7388c4fe54219e0)
 
 #define PAM_INFO 1 /* unit → pam_device_info */
 #define PAM_STATUS 2 /* unit → pam_status */
@@ -258,7 +258,7 @@ static inline void pam_read_table_health(pam_reader *r, pam_table_health *m) {
   *m = (pam_table_health)pam_get_varint(r, 2);
 }
 
-typedef struct { pam_state state; pam_mode mode; bool has_fault; pam_fault fault; uint64_t time_us; uint64_t ticks; uint32_t overruns; uint32_t frames_good; uint32_t frames_bad; uint32_t telemetry_dropped; uint32_t saturated_ticks; uint32_t line_errors; pam_table_health tables[2]; } pam_status;
+typedef struct { pam_state state; pam_mode mode; bool has_fault; pam_fault fault; uint64_t time_us; uint64_t ticks; uint32_t overruns; uint32_t frames_good; uint32_t frames_bad; uint32_t telemetry_dropped; uint32_t saturated_ticks; uint32_t line_errors; uint32_t bus_offs; pam_table_health tables[2]; } pam_status;
 static inline void pam_write_status(pam_writer *w, const pam_status *m) {
   pam_write_state(w, &(*m).state);
   pam_write_mode(w, &(*m).mode);
@@ -274,6 +274,7 @@ static inline void pam_write_status(pam_writer *w, const pam_status *m) {
   pam_put_varint(w, (*m).telemetry_dropped);
   pam_put_varint(w, (*m).saturated_ticks);
   pam_put_varint(w, (*m).line_errors);
+  pam_put_varint(w, (*m).bus_offs);
   for (unsigned i0 = 0; i0 < 2; i0++) {
   pam_write_table_health(w, &(*m).tables[i0]);
   }
@@ -293,6 +294,7 @@ static inline void pam_read_status(pam_reader *r, pam_status *m) {
   (*m).telemetry_dropped = (uint32_t)pam_get_varint(r, UINT32_MAX);
   (*m).saturated_ticks = (uint32_t)pam_get_varint(r, UINT32_MAX);
   (*m).line_errors = (uint32_t)pam_get_varint(r, UINT32_MAX);
+  (*m).bus_offs = (uint32_t)pam_get_varint(r, UINT32_MAX);
   for (unsigned i0 = 0; i0 < 2; i0++) {
   pam_read_table_health(r, &(*m).tables[i0]);
   }
@@ -769,7 +771,17 @@ static inline void pam_read_valve_pair(pam_reader *r, pam_valve_pair *m) {
   (*m).band_pa = pam_get_f32(r);
 }
 
-typedef struct { pam_feed_forward feed_forward; pam_force_loop force_loop; pam_stroke_loop stroke_loop; pam_joint joint; pam_regulator regulator; pam_limits limits; pam_sensor_watch pressure; pam_sensor_watch stroke; pam_sensor_watch force; pam_watch watch; uint32_t hold_on; float motion_band_m; float pressure_band_pa; pam_scales scales; pam_command_output command; pam_valve_pair valves; } pam_settings;
+typedef struct { uint8_t address; uint16_t kbit_per_s; } pam_can_line;
+static inline void pam_write_can_line(pam_writer *w, const pam_can_line *m) {
+  pam_put_u8(w, (*m).address);
+  pam_put_varint(w, (*m).kbit_per_s);
+}
+static inline void pam_read_can_line(pam_reader *r, pam_can_line *m) {
+  (*m).address = pam_get_u8(r);
+  (*m).kbit_per_s = (uint16_t)pam_get_varint(r, UINT16_MAX);
+}
+
+typedef struct { pam_feed_forward feed_forward; pam_force_loop force_loop; pam_stroke_loop stroke_loop; pam_joint joint; pam_regulator regulator; pam_limits limits; pam_sensor_watch pressure; pam_sensor_watch stroke; pam_sensor_watch force; pam_watch watch; uint32_t hold_on; float motion_band_m; float pressure_band_pa; pam_scales scales; pam_command_output command; pam_valve_pair valves; pam_can_line can; } pam_settings;
 static inline void pam_write_settings(pam_writer *w, const pam_settings *m) {
   pam_write_feed_forward(w, &(*m).feed_forward);
   pam_write_force_loop(w, &(*m).force_loop);
@@ -787,6 +799,7 @@ static inline void pam_write_settings(pam_writer *w, const pam_settings *m) {
   pam_write_scales(w, &(*m).scales);
   pam_write_command_output(w, &(*m).command);
   pam_write_valve_pair(w, &(*m).valves);
+  pam_write_can_line(w, &(*m).can);
 }
 static inline void pam_read_settings(pam_reader *r, pam_settings *m) {
   pam_read_feed_forward(r, &(*m).feed_forward);
@@ -805,6 +818,7 @@ static inline void pam_read_settings(pam_reader *r, pam_settings *m) {
   pam_read_scales(r, &(*m).scales);
   pam_read_command_output(r, &(*m).command);
   pam_read_valve_pair(r, &(*m).valves);
+  pam_read_can_line(r, &(*m).can);
 }
 
 typedef struct { pam_side side; uint32_t length; uint32_t crc; } pam_table_begin;
@@ -1243,12 +1257,12 @@ static inline void pam_read_event(pam_reader *r, pam_event *m) {
   }
 }
 
-typedef enum { PAM_FIELD_SET_POINT = 0, PAM_FIELD_REFERENCE = 1, PAM_FIELD_FORCE_LOOP = 2, PAM_FIELD_STROKE_LOOP = 3, PAM_FIELD_JOINT = 4, PAM_FIELD_REGULATOR = 5, PAM_FIELD_LIMITS = 6, PAM_FIELD_SENSOR_WATCH = 7, PAM_FIELD_WATCH = 8, PAM_FIELD_BANDS = 9, PAM_FIELD_RATE = 10, PAM_FIELD_SCALE = 11, PAM_FIELD_COMMAND = 12, PAM_FIELD_VALVES = 13 } pam_field;
+typedef enum { PAM_FIELD_SET_POINT = 0, PAM_FIELD_REFERENCE = 1, PAM_FIELD_FORCE_LOOP = 2, PAM_FIELD_STROKE_LOOP = 3, PAM_FIELD_JOINT = 4, PAM_FIELD_REGULATOR = 5, PAM_FIELD_LIMITS = 6, PAM_FIELD_SENSOR_WATCH = 7, PAM_FIELD_WATCH = 8, PAM_FIELD_BANDS = 9, PAM_FIELD_RATE = 10, PAM_FIELD_SCALE = 11, PAM_FIELD_COMMAND = 12, PAM_FIELD_VALVES = 13, PAM_FIELD_CAN = 14 } pam_field;
 static inline void pam_write_field(pam_writer *w, const pam_field *m) {
   pam_put_varint(w, (uint64_t)*m);
 }
 static inline void pam_read_field(pam_reader *r, pam_field *m) {
-  *m = (pam_field)pam_get_varint(r, 13);
+  *m = (pam_field)pam_get_varint(r, 14);
 }
 
 enum { PAM_TABLE_FAULT_NOT_BEGUN = 0, PAM_TABLE_FAULT_GAP = 1, PAM_TABLE_FAULT_TOO_LONG = 2, PAM_TABLE_FAULT_INCOMPLETE = 3, PAM_TABLE_FAULT_CHECK = 4, PAM_TABLE_FAULT_VERSION = 5, PAM_TABLE_FAULT_MALFORMED = 6, PAM_TABLE_FAULT_NOT_FINITE = 7, PAM_TABLE_FAULT_NOT_ORDERED = 8, PAM_TABLE_FAULT_OUT_OF_RANGE = 9, PAM_TABLE_FAULT_UNKNOWN_EFFECT = 10 };

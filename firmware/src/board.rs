@@ -123,6 +123,8 @@ pub struct Hardware {
     pub enable_input: bool,
     /// Whether the board has outputs for a pair of on/off valves.
     pub valve_pair: bool,
+    /// Whether the board has a CAN controller.
+    pub can: bool,
     /// Highest command that is ever given to a regulator, Pa.
     pub command_ceiling_pa: f32,
     /// Settings of a new device.
@@ -139,6 +141,7 @@ impl Hardware {
         supply: None,
         enable_input: false,
         valve_pair: false,
+        can: false,
         command_ceiling_pa: 2e6,
         settings: Settings::DEFAULT,
     };

@@ -40,7 +40,7 @@ use model_core::link::settings::Settings;
 
 use crate::board::{Identity, Inputs, Outputs};
 use crate::control::Controller;
-use crate::server::Server;
+use crate::server::{Line, Server};
 use crate::shared::Shared;
 use crate::update::{Key, Updater};
 
@@ -225,7 +225,7 @@ fn talk(
             Err(error) => return Err(error),
         };
         for &byte in &bytes[..count] {
-            server.note_counts(accumulator.counts());
+            server.note_counts(Line::Serial, accumulator.counts());
             let Some(Ok(request)) = accumulator.push_to_answer(byte) else { continue };
             stream.write_all(server.handle(request, shared))?;
             if server.wants_restart() {

@@ -33,6 +33,15 @@ pub type Updates = std::boxed::Box<dyn Update + Send>;
 #[cfg(not(any(test, feature = "std")))]
 pub type Updates = &'static mut (dyn Update + Send);
 
+/// Where a request comes from. Each line has its answers; all share the controller, which its sessions guard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// The only line, or the one to a computer beside the device.
+    Serial,
+    /// A CAN bus.
+    Can,
+}
+
 /// The link's server: one request at a time.
 pub struct Server<F: NorFlash> {
     identity: Identity,
@@ -40,7 +49,7 @@ pub struct Server<F: NorFlash> {
     starts: u32,
     upload: Upload,
     wear: Wear,
-    counts: frame::Counts,
+    counts: [frame::Counts; 2],
     restart: bool,
     update: Option<Updates>,
 }
@@ -79,7 +88,7 @@ impl<F: NorFlash> Server<F> {
             }
         };
         use_settings(&mut store, damaged, shared)?;
-        let counts = frame::Counts::default();
+        let counts = [frame::Counts::default(); 2];
         let mut server = Self {
             identity,
             store,
@@ -230,9 +239,14 @@ impl<F: NorFlash> Server<F> {
         self.restart
     }
 
-    /// Gives the server the counts of the frame accumulator.
-    pub fn note_counts(&mut self, counts: frame::Counts) {
-        self.counts = counts;
+    /// Gives the server the counts of a line's frame accumulator.
+    pub fn note_counts(&mut self, line: Line, counts: frame::Counts) {
+        self.counts[line as usize] = counts;
+    }
+
+    /// A count of frames over all lines.
+    fn frames(&self, count: fn(&frame::Counts) -> u32) -> u32 {
+        self.counts.iter().map(count).fold(0, u32::wrapping_add)
     }
 
     /// Answers one frame in its own place; gives the answer, empty where there is none to give.

@@ -69,6 +69,8 @@ pub struct Shared {
     dropped: AtomicU32,
     /// Times that the receiver lost bytes.
     line_errors: AtomicU32,
+    /// Times that the CAN controller was off the bus.
+    bus_offs: AtomicU32,
     /// The state changed: there may be something to keep.
     changed: Signal<CriticalSectionRawMutex, ()>,
 }
@@ -86,6 +88,7 @@ impl Shared {
             outbox: placed!(Waiting, Channel::new()),
             dropped: AtomicU32::new(0),
             line_errors: AtomicU32::new(0),
+            bus_offs: AtomicU32::new(0),
             changed: Signal::new(),
         }
     }
@@ -116,6 +119,25 @@ impl Shared {
     /// Counts what the receiver has lost.
     pub fn count_line_errors(&self, times: u32) {
         self.line_errors.fetch_add(times, Ordering::Relaxed);
+    }
+
+    /// Times that the CAN controller was off the bus, since the start.
+    pub fn bus_offs(&self) -> u32 {
+        self.bus_offs.load(Ordering::Relaxed)
+    }
+
+    /// Counts that the CAN controller went off the bus.
+    pub fn count_bus_off(&self) {
+        self.bus_offs.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Vents and disarms, also for those who do not own the device: the message to all devices of a bus. In a fault the device stays there, vented.
+    pub fn vent(&self) {
+        self.with(|controller| {
+            // As the requests `stop` and `disarm`, whose refusals name the fault in which nothing more is to be done.
+            let _ = controller.stop();
+            let _ = controller.disarm();
+        });
     }
 
     /// One control step; what it says is put where the telemetry task finds it. A sample without room is dropped and

@@ -42,7 +42,7 @@ pub use settings::Kept;
 
 /// Version of the layout. It changes when any kept value has other fields: postcard's bytes do not describe themselves, and a value
 /// of another layout would be read as if it were of this one. Its key changes with it.
-pub const FORMAT: u16 = 7;
+pub const FORMAT: u16 = 8;
 /// Longest item with its key, rounded up to words of a flash of at most 16 bytes.
 const BUFFER: usize = image::MAX_LEN + 16;
 

@@ -3,7 +3,7 @@
 //! | layer | where | what |
 //! | --- | --- | --- |
 //! | frame | [`frame`] | COBS(header ‖ body ‖ CRC-32) followed by one zero byte |
-//! | CAN FD | [`can`] | the bytes of frames in messages, for several devices on one bus |
+//! | CAN | [`can`] | the bytes of frames in messages, for several devices on one bus |
 //! | hello | [`hello`] | the first answer, whose layout never changes: every version of the peer |
 //! | messages | [`messages`], [`settings`] | the bodies, as postcard writes them; closed enums, never text |
 //! | endpoints | [`endpoints`] | ONE table: number, name, request, response; and the hash of all of it |

@@ -17,6 +17,7 @@ from unicorn.arm_const import (
     UC_ARM_REG_BASEPRI, UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_PRIMASK, UC_ARM_REG_SP, UC_CPU_ARM_CORTEX_M4,
 )
 
+import can_bus
 import peripherals
 import valve_timer
 
@@ -67,6 +68,8 @@ class Chip:
         # Fill and vent valve of a pair: since when, and whether each signal says open.
         self.valves = []
         self.reset_flags = 1 << 27 | 1 << 26
+        # The CAN bus that the chip is connected to.
+        self.bus = None
         self._begin()
 
     def _begin(self):
@@ -86,9 +89,10 @@ class Chip:
         self.tim5 = peripherals.Timer(self, 50, 32)
         self.tim4 = valve_timer.ValveTimer(self)
         self.watchdog = peripherals.Watchdog(self)
+        self.can = can_bus.Can(self)
         self.blocks = {
             0x40000400: self.tim3, 0x40000800: self.tim4, 0x40000C00: self.tim5, 0x40003000: self.watchdog, 0x40004400: self.uart2,
-            0x40007000: self.power, 0x40007400: self.dac, 0x40012000: self.adc, 0x40013C00: self.exti,
+            0x40006400: self.can, 0x40007000: self.power, 0x40007400: self.dac, 0x40012000: self.adc, 0x40013C00: self.exti,
             0x40020000: self.porta, 0x40020400: self.portb, 0x40020800: self.portc, 0x40023800: self.rcc, 0x40023C00: self.flash,
             0x40026000: self.dma1, 0x40026400: self.dma2,
         }
@@ -224,6 +228,8 @@ class Chip:
         if self.uart2.waits():
             self.pending.add(peripherals.Uart.IRQ)
         self.pending.update(self.dma1.waiting())
+        # A handler is called again only if its cause is still there at its end.
+        self.pending.update(line for line in self.can.waiting() if line not in self.active)
 
     def _urgency(self, line):
         return line + 12 if line < 0 else self.priorities.get(line, 0)
@@ -280,6 +286,8 @@ class Chip:
                 self.restarts.append((why, self.now))
                 self.reset_flags |= flags
                 self._begin()
+                if self.bus:
+                    self.bus.restarted(self)
                 continue
             if until and until():
                 return True

@@ -50,17 +50,18 @@ def frame(kind, number, sequence, body=b""):
 
 
 # Places of settings from the end of the message; a varint before them has one byte.
-VALVES = 29
+CAN = 3
+VALVES = 29 + CAN
 SETTING = {
     "command.low": -8 - VALVES, "command.full_pa": -4 - VALVES,
     "scales.pressure.at_zero": -68 - VALVES, "scales.pressure.per_unit": -64 - VALVES, "scales.pressure.filter_s": -60 - VALVES,
     "scales.second_pressure.at_zero": -32 - VALVES, "scales.second_pressure.per_unit": -28 - VALVES,
     "watch.second_pressure_pa": -86 - VALVES, "watch.supply_low_pa": -82 - VALVES,
-    "valves.supply_pa": -28, "valves.fill_pa_per_s": -24, "valves.vent_pa_per_s": -20, "valves.dead_s": -16, "valves.least_s": -12,
-    "valves.apart_s": -8, "valves.band_pa": -4,
+    "valves.supply_pa": -28 - CAN, "valves.fill_pa_per_s": -24 - CAN, "valves.vent_pa_per_s": -20 - CAN, "valves.dead_s": -16 - CAN,
+    "valves.least_s": -12 - CAN, "valves.apart_s": -8 - CAN, "valves.band_pa": -4 - CAN,
 }
 # Those of one byte.
-BYTES = {"enable_input": -78 - VALVES, "valves__period_ticks": -VALVES}
+BYTES = {"enable_input": -78 - VALVES, "valves__period_ticks": -VALVES, "can__address": -CAN}
 
 
 def varint(number):
@@ -99,19 +100,33 @@ class Refused(Exception):
     """The device says no."""
 
 
-class Link:
-    """One request at a time over a chip's line."""
+class SerialLine:
+    """The chip's serial line; it begins anew with each restart."""
 
     def __init__(self, chip):
+        self.chip = chip
+
+    @property
+    def sent(self):
+        return self.chip.uart2.sent
+
+    def send(self, data):
+        self.chip.uart2.send(data)
+
+
+class Link:
+    """One request at a time over a line of a chip."""
+
+    def __init__(self, chip, line=None):
         self.chip, self.sequence, self.read = chip, 0, 0
-        self.uart = None
+        self.line, self.sent = line or SerialLine(chip), None
         self.controls, self.kept_alive = False, 0.0
 
     def frames(self):
-        if self.uart is not self.chip.uart2:
-            self.uart, self.read = self.chip.uart2, 0
-        *whole, rest = bytes(self.uart.sent[self.read :]).split(b"\0")
-        self.read = len(self.uart.sent) - len(rest)
+        if self.sent is not self.line.sent:
+            self.sent, self.read = self.line.sent, 0
+        *whole, rest = bytes(self.sent[self.read :]).split(b"\0")
+        self.read = len(self.sent) - len(rest)
         for data in whole:
             raw = unstuffed(data)
             if raw and len(raw) >= 8 and zlib.crc32(raw[:-4]) == struct.unpack("<I", raw[-4:])[0]:
@@ -127,7 +142,7 @@ class Link:
             found.extend(one for one in self.frames() if one[1:3] == (number, self.sequence & 0xFFFF))
             return bool(found)
 
-        self.chip.uart2.send(frame(REQUEST, number, self.sequence, body))
+        self.line.send(frame(REQUEST, number, self.sequence, body))
         end, restarts = self.chip.now + wait, len(self.chip.restarts)
         # A chip that restarts does not answer.
         while self.chip.now < end and not answered() and len(self.chip.restarts) == restarts:
@@ -143,7 +158,7 @@ class Link:
         if self.controls and self.chip.now - self.kept_alive > HEARTBEAT_S:
             self.kept_alive = self.chip.now
             self.sequence += 1
-            self.chip.uart2.send(frame(REQUEST, KEEP_ALIVE, self.sequence, varint(SESSION)))
+            self.line.send(frame(REQUEST, KEEP_ALIVE, self.sequence, varint(SESSION)))
 
     def arm(self):
         self.ask(ARM, varint(SESSION))
@@ -156,7 +171,7 @@ class Link:
         reader = Reader(self.ask(STATUS))
         state, mode = STATES[reader.byte()], reader.byte()
         fault = FAULT_NAMES[reader.byte()] if reader.byte() else None
-        names = "time_us ticks overruns frames_good frames_bad dropped saturated line_errors".split()
+        names = "time_us ticks overruns frames_good frames_bad dropped saturated line_errors bus_offs".split()
         return {"state": state, "mode": mode, "fault": fault} | {name: reader.varint() for name in names}
 
     def change(self, **values):

@@ -17,5 +17,5 @@ if ! "$place/bin/python" -c 'import unicorn, elftools, cryptography' 2>/dev/null
     "$place/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/nucleo/requirements.txt
 fi
 cd tests/nucleo
-[ $# -gt 0 ] || set -- test_image test_valves test_power_cuts test_update
+[ $# -gt 0 ] || set -- test_image test_valves test_can test_power_cuts test_update
 PYTHONDONTWRITEBYTECODE=1 exec "../../$place/bin/python" -m unittest "$@"

@@ -6,7 +6,7 @@
 import unittest
 
 from board import TABLE, Board
-from link import CLEAR_FAULT, FORCE_MODE, PRESSURE_MODE, RESTART, SETTINGS, STOP, Refused
+from link import BYTES, CLEAR_FAULT, FORCE_MODE, PRESSURE_MODE, RESTART, SETTINGS, STOP, Refused
 from pair_board import PairBoard
 
 PERIOD_S = 0.010
@@ -94,7 +94,7 @@ class Outputs(unittest.TestCase):
         board.link.ask(RESTART)
         board.restarted()
         self.assertEqual(board.link.ask(SETTINGS), kept)
-        self.assertEqual(kept[-29], 8)
+        self.assertEqual(kept[BYTES["valves__period_ticks"]], 8)
 
 
 class Loop(unittest.TestCase):

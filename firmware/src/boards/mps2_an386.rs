@@ -20,6 +20,7 @@ use core::panic::PanicInfo;
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::Timer;
@@ -27,7 +28,7 @@ use firmware::board::{Hardware, Identity};
 use firmware::modes::Seat;
 use firmware::server::Server;
 use firmware::shared::Shared;
-use firmware::tasks;
+use firmware::tasks::{self, SharedServer};
 use model_core::link::hello::Board;
 use static_cell::StaticCell;
 
@@ -150,12 +151,14 @@ async fn control(shared: &'static Shared) {
 
 #[embassy_executor::task]
 async fn telemetry(port: &'static Port, shared: &'static Shared) {
-    tasks::telemetry(port, shared).await;
+    tasks::telemetry(port, shared, |_| {}).await;
 }
 
 #[embassy_executor::task]
-async fn link(port: &'static Port, shared: &'static Shared, server: &'static mut Server<FileFlash>) {
-    tasks::link(&mut Receiver(&LINK), port, server, shared).await;
+async fn link(port: &'static Port, shared: &'static Shared, server: &'static SharedServer<FileFlash>) {
+    let mut receiver = Receiver(&LINK);
+    let answer = tasks::link(firmware::server::Line::Serial, &mut receiver, port, server, shared);
+    select(answer, tasks::keep(server, shared)).await;
     // The answer is on its way out of the pipe.
     Timer::after_millis(20).await;
     watchdog::restart_on_request();
@@ -171,9 +174,9 @@ fn spawn(spawner: SendSpawner, shared: &'static Shared, port: &'static Port) -> 
         fault: None,
     };
     // In a place of its own: a task would keep it twice, as its argument and as its variable.
-    static SERVER: StaticCell<Server<FileFlash>> = StaticCell::new();
-    let server =
-        SERVER.init(Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?);
+    static SERVER: StaticCell<SharedServer<FileFlash>> = StaticCell::new();
+    let server = Server::start(identity, flash, shared).map_err(|_| "the store cannot be opened")?;
+    let server = SERVER.init(Mutex::new(server));
     let full = |_| "a task has no place";
     #[cfg(feature = "preempting")]
     preempting::start().spawn(control(shared).map_err(full)?);

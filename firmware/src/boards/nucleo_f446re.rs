@@ -2,6 +2,7 @@
 //!
 //! | pin | Arduino name | what |
 //! | --- | --- | --- |
+//! | PA11, PA12 | – | CAN transceiver, receive and transmit: the link over a bus, see `can.rs` |
 //! | PA2, PA3 | – | link: USART2 over the debug probe's USB port, 1 Mbaud |
 //! | PA0 | A0 | pressure sensor, see [`PRESSURE`]; 100 kΩ to ground |
 //! | PA1 | A1 | stroke sensor, see [`STROKE`]; 100 kΩ to ground |
@@ -27,8 +28,9 @@
 //! | none can hold it back | failing crystal: valve open, restart |
 //! | 1 | supply falls: valve open; above critical sections, see `critical.rs` |
 //! | 6 | tick of the control loop, control loop |
-//! | 8 | link, time |
+//! | 8 | link, CAN, time |
 
+mod can;
 mod clock;
 mod critical;
 mod flash;
@@ -44,6 +46,7 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{entry, exception};
 use embassy_executor::{Executor, InterruptExecutor, Spawner};
+use embassy_futures::select::select;
 use embassy_stm32::flash::Flash;
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -51,9 +54,9 @@ use embassy_sync::mutex::Mutex;
 use embassy_time::Timer;
 use firmware::board::{Hardware, Identity, Inputs, Outputs, Plant, Signals, Span};
 use firmware::modes::Seat;
-use firmware::server::Server;
+use firmware::server::{Line, Server};
 use firmware::shared::Shared;
-use firmware::tasks;
+use firmware::tasks::{self, SharedServer};
 use firmware::tick::TICK_US;
 use firmware::update::Updater;
 use model_core::link::hello::Board;
@@ -97,6 +100,7 @@ static HARDWARE: Hardware = Hardware {
     supply: Some(VOLTS),
     enable_input: true,
     valve_pair: true,
+    can: true,
     command_ceiling_pa: 700e3,
     settings: Settings {
         scales: Scales {
@@ -124,6 +128,7 @@ static HARDWARE: Hardware = Hardware {
 };
 
 type Port = Mutex<CriticalSectionRawMutex, Sender>;
+type Bus = Mutex<CriticalSectionRawMutex, can::Sender>;
 
 /// The control loop's own: scans in, commands out.
 struct Muscle {
@@ -178,8 +183,14 @@ async fn control(shared: &'static Shared) {
 }
 
 #[embassy_executor::task]
-async fn telemetry(port: &'static Port, shared: &'static Shared) {
-    tasks::telemetry(port, shared).await;
+async fn telemetry(port: &'static Port, bus: &'static Bus, shared: &'static Shared) {
+    // While an answer is put into the bus's queue, a topic would fall into its midst.
+    let offer = |frame: &[u8]| {
+        if let Ok(mut sender) = bus.try_lock() {
+            sender.offer(frame);
+        }
+    };
+    tasks::telemetry(port, shared, offer).await;
 }
 
 #[embassy_executor::task]
@@ -187,10 +198,28 @@ async fn link(
     mut receiver: Receiver,
     port: &'static Port,
     shared: &'static Shared,
-    server: &'static mut Server<StoreFlash>,
+    server: &'static SharedServer<StoreFlash>,
 ) {
     // It returns when the host has requested a restart: neither end of this line fails.
-    tasks::link(&mut receiver, port, server, shared).await;
+    let answer = tasks::link(Line::Serial, &mut receiver, port, server, shared);
+    select(answer, tasks::keep(server, shared)).await;
+    restart().await;
+}
+
+/// The same over the bus.
+#[embassy_executor::task]
+async fn bus_link(
+    mut receiver: can::Receiver,
+    bus: &'static Bus,
+    shared: &'static Shared,
+    server: &'static SharedServer<StoreFlash>,
+) {
+    select(tasks::link(Line::Can, &mut receiver, bus, server, shared), can::supervise()).await;
+    restart().await;
+}
+
+/// Restarts the chip once the answer is out.
+async fn restart() {
     Timer::after_millis(20).await;
     dump();
     cortex_m::peripheral::SCB::sys_reset();
@@ -216,6 +245,10 @@ fn start_interrupts() {
         (Interrupt::TIM5, Priority::P8),
         (Interrupt::USART2, Priority::P8),
         (Interrupt::DMA1_STREAM6, Priority::P8),
+        (Interrupt::CAN1_TX, Priority::P8),
+        (Interrupt::CAN1_RX0, Priority::P8),
+        (Interrupt::CAN1_RX1, Priority::P8),
+        (Interrupt::CAN1_SCE, Priority::P8),
     ];
     for (line, priority) in all {
         line.set_priority(priority);
@@ -254,17 +287,26 @@ fn spawn(spawner: Spawner, start: &Start) -> Option<()> {
         fault: (start.clock_failed || !start.crystal).then_some(Fault::ClockFailed),
     };
     // In a place of its own: a task would keep it twice, as its argument and as its variable.
-    static SERVER: StaticCell<Server<StoreFlash>> = StaticCell::new();
-    // SAFETY: the store and the slots use different sectors, and only the link's task uses either.
+    static SERVER: StaticCell<SharedServer<StoreFlash>> = StaticCell::new();
+    static BUS: StaticCell<Bus> = StaticCell::new();
+    // SAFETY: the store and the slots use different sectors, and only the server, which answers one line at a time, uses either.
     let slots_flash = Flash::new_blocking(unsafe { embassy_stm32::peripherals::FLASH::steal() });
     let flash = StoreFlash::new(Flash::new_blocking(p.FLASH));
-    let server = SERVER.init(Server::start(identity, flash, shared).ok()?);
+    let mut server = Server::start(identity, flash, shared).ok()?;
     if let Some(key) = slots::KEY {
         static UPDATER: StaticCell<Updater<Slots>> = StaticCell::new();
         server.take_updates(UPDATER.init(Updater::new(Slots::new(slots_flash), key)));
     }
+    let server: &'static SharedServer<StoreFlash> = SERVER.init(Mutex::new(server));
+    let bus: &'static Bus = BUS.init(Mutex::new(can::Sender::new()));
     CONTROL.start(interrupt::UART5).spawn(control(shared).ok()?);
-    spawner.spawn(telemetry(port, shared).ok()?);
+    // Without its crystal the clock is not exact enough for a bus that others use.
+    if start.crystal
+        && let Some(receiver) = can::start(shared)
+    {
+        spawner.spawn(bus_link(receiver, bus, shared, server).ok()?);
+    }
+    spawner.spawn(telemetry(port, bus, shared).ok()?);
     spawner.spawn(link(Receiver::new(shared), port, shared, server).ok()?);
     super::log!("started");
     Some(())

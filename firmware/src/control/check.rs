@@ -3,8 +3,9 @@
 //! A range says what a value can sensibly be on any muscle of up to some metres and some kilonewtons; nothing in it is tuned. What a
 //! board's converters can deliver is [`Hardware`]'s.
 
+use model_core::link::can::Address;
 use model_core::link::messages::{Field, Refusal};
-use model_core::link::settings::{Joint, Regulator, SensorScale, Settings};
+use model_core::link::settings::{CanLine, Joint, Regulator, SensorScale, Settings};
 
 use crate::board::{Hardware, Span};
 use crate::tick::TICK_S;
@@ -51,6 +52,7 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
         (Field::Regulator, regulator(&settings.regulator, hardware)),
         (Field::Command, command(settings)),
         (Field::Valves, valves(settings, hardware)),
+        (Field::Can, can(&settings.can, hardware)),
         (Field::Limits, limits(settings, hardware)),
         (Field::SensorWatch, sensors(settings, hardware)),
         (Field::Watch, watch(settings, hardware)),
@@ -66,8 +68,8 @@ pub fn check_settings(settings: &Settings, hardware: &Hardware) -> Result<(), Re
 pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
     let own = &hardware.settings;
     let mut repaired = false;
-    // Each iteration repairs one of eleven groups; a repaired scale may spoil limits and watches.
-    for _ in 0..11 {
+    // Each iteration repairs one of twelve groups; a repaired scale may spoil limits and watches.
+    for _ in 0..12 {
         let Err(Refusal::Value(field)) = check_settings(settings, hardware) else { break };
         match field {
             Field::ForceLoop => settings.force_loop = own.force_loop,
@@ -86,6 +88,7 @@ pub fn repair_settings(settings: &mut Settings, hardware: &Hardware) -> bool {
             Field::Scale => settings.scales = own.scales,
             Field::Command => settings.command = own.command,
             Field::Valves => settings.valves = own.valves,
+            Field::Can => settings.can = own.can,
             Field::SetPoint | Field::Reference | Field::Rate => *settings = *own,
         }
         repaired = true;
@@ -185,6 +188,12 @@ fn command(settings: &Settings) -> bool {
     // 4–20 mA begins at 0.2; more than half the range below no pressure is a mistake.
     all(&[(c.low, 0.0, 0.5), (c.full_pa, 10e3, MOST_PRESSURE)])
         && settings.regulator.command_max_pa <= c.full_pa
+}
+
+/// An address needs a board with a CAN controller.
+fn can(can: &CanLine, hardware: &Hardware) -> bool {
+    CanLine::RATES.contains(&can.kbit_per_s)
+        && (!can.is_used() || (hardware.can && Address::new(can.address).is_some()))
 }
 
 /// Periods of a pair of valves, ticks: shorter, valves that switch in 1 ms are hardly ever open; longer, no muscle is controlled.

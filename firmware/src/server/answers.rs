@@ -41,11 +41,12 @@ impl<F: NorFlash> Answers<'_, F> {
             time_us: controller.time_us(),
             ticks: controller.ticks(),
             overruns: controller.overruns(),
-            frames_good: self.server.counts.good,
-            frames_bad: self.server.counts.bad,
+            frames_good: self.server.frames(|counts| counts.good),
+            frames_bad: self.server.frames(|counts| counts.bad),
             telemetry_dropped: self.shared.telemetry_dropped(),
             saturated_ticks: controller.saturated_ticks(),
             line_errors: self.shared.line_errors(),
+            bus_offs: self.shared.bus_offs(),
             tables: Side::ALL.map(|side| controller.health(side).state()),
         });
         Ok(())

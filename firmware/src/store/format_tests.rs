@@ -92,6 +92,7 @@ fn settings_of_older_formats_are_taken_over_field_by_field() {
         (include_str!("fixtures/format-4.txt"), 4.5e-3, 10_000, 7_777, 7.0),
         (include_str!("fixtures/format-5.txt"), 4.5e-3, 10_000, 60_000, 7.0),
         (include_str!("fixtures/format-6.txt"), 4.5e-3, 10_000, 60_000, 1.0),
+        (include_str!("fixtures/format-7.txt"), 4.5e-3, 10_000, 60_000, 1.0),
     ];
     for (fixture, line_s, hold_ticks, armed_silence_ticks, per_unit) in formats {
         let mut store = open(flash_of(fixture));
@@ -102,6 +103,7 @@ fn settings_of_older_formats_are_taken_over_field_by_field() {
         settings.command.full_pa = 777e3;
         settings.watch.supply_low_pa = 77.0;
         settings.valves.supply_pa = 777e3;
+        settings.can.address = 7;
         assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
         assert_eq!((settings.regulator.line_s, settings.pressure_band_pa), (line_s, 1_234.0));
         assert_eq!(settings.watch.hold_ticks, hold_ticks);
@@ -109,7 +111,9 @@ fn settings_of_older_formats_are_taken_over_field_by_field() {
         // Older firmware had the scales of its board.
         let (full_pa, supply_low_pa) = if per_unit == 1.0 { (2e6, 0.0) } else { (777e3, 77.0) };
         assert_eq!((settings.scales.force.per_unit, settings.command.full_pa), (per_unit, full_pa));
-        assert_eq!((settings.watch.supply_low_pa, settings.valves.supply_pa), (supply_low_pa, 777e3));
+        let supply_pa = if fixture == include_str!("fixtures/format-7.txt") { 700e3 } else { 777e3 };
+        assert_eq!((settings.watch.supply_low_pa, settings.valves.supply_pa), (supply_low_pa, supply_pa));
+        assert_eq!(settings.can.address, 7);
         assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
         assert_eq!(store.past_fault(0), Ok(Some(report())));
         assert_eq!(store.count_start(), Ok(2));
@@ -126,6 +130,7 @@ fn a_migration_that_loses_power_leaves_the_older_settings_or_the_new() {
         include_str!("fixtures/format-4.txt"),
         include_str!("fixtures/format-5.txt"),
         include_str!("fixtures/format-6.txt"),
+        include_str!("fixtures/format-7.txt"),
     ] {
         let mut store = open(flash_of(fixture));
         let mut settings = Settings::default();
@@ -143,11 +148,11 @@ fn a_migration_that_loses_power_leaves_the_older_settings_or_the_new() {
 /// Every bit of settings of the layout before: a wrong one is noticed there, too.
 #[test]
 fn settings_of_the_layout_before_of_which_a_bit_is_wrong_are_not_trusted() {
-    let flash = flash_of(include_str!("fixtures/format-6.txt"));
+    let flash = flash_of(include_str!("fixtures/format-7.txt"));
     let mut store = open(flash.clone());
     let mut settings = Settings::default();
     assert_eq!(store.settings(&mut settings), Ok(Kept::Older));
-    let bytes = store.bytes(0x36).expect("readable").expect("kept").to_vec();
+    let bytes = store.bytes(0x37).expect("readable").expect("kept").to_vec();
     let place = flash.bytes.windows(bytes.len()).position(|w| w == bytes).expect("they are there");
     for bit in 0..8 * bytes.len() {
         let mut damaged = flash.clone();

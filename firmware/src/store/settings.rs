@@ -14,10 +14,11 @@ use model_core::link::settings::Settings;
 
 use super::{FORMAT, Store};
 
-/// Key of the settings; 0x30 to 0x33, 0x35 and 0x36 held those of the layouts 1 to 6.
-const SETTINGS: u8 = 0x37;
+/// Key of the settings; 0x30 to 0x33 and 0x35 to 0x37 held those of the layouts 1 to 7.
+const SETTINGS: u8 = 0x38;
 const SEAL: u8 = 0x34;
 const LAYOUT: u8 = 0x3F;
+const SETTINGS_7: u8 = 0x37;
 const SETTINGS_6: u8 = 0x36;
 const SETTINGS_5: u8 = 0x35;
 const SETTINGS_4: u8 = 0x33;
@@ -60,7 +61,8 @@ fn sum_of(bytes: Option<&[u8]>) -> u32 {
 struct Older<'s> {
     settings: &'s mut Settings,
     /// Number of the layout: the regulator has a line since 3, a hold and a vent have their watches since 4, an armed device since 5.
-    /// Sensors and command have scales since 6, and further inputs are watched. A pair of valves is possible since 7.
+    /// Sensors and command have scales since 6, and further inputs are watched. A pair of valves is possible since 7, a CAN bus
+    /// since 8.
     layout: u16,
 }
 
@@ -82,7 +84,8 @@ impl Fields for Older<'_> {
             pressure_band_pa,
             scales,
             command,
-            valves: _,
+            valves,
+            can: _,
         } = &mut *self.settings;
         feed_forward.walk(walk);
         force_loop.walk(walk);
@@ -133,6 +136,9 @@ impl Fields for Older<'_> {
             scales.walk(walk);
             command.walk(walk);
         }
+        if self.layout >= 7 {
+            valves.walk(walk);
+        }
     }
 }
 
@@ -164,7 +170,7 @@ impl<F: NorFlash> Store<F> {
         }
         // The layouts from 4 on have a seal.
         let mut last = SETTINGS_4;
-        for key in [SETTINGS_5, SETTINGS_6] {
+        for key in [SETTINGS_5, SETTINGS_6, SETTINGS_7] {
             if self.bytes(key)?.is_some() {
                 last = key;
             }
@@ -176,7 +182,14 @@ impl<F: NorFlash> Store<F> {
         if bytes.is_some_and(|bytes| !sealed(Some(bytes))) {
             return Ok(Kept::Untrusted);
         }
-        let older = [(SETTINGS_6, 6), (SETTINGS_5, 5), (SETTINGS_4, 4), (SETTINGS_3, 3), (SETTINGS_2, 2)];
+        let older = [
+            (SETTINGS_7, 7),
+            (SETTINGS_6, 6),
+            (SETTINGS_5, 5),
+            (SETTINGS_4, 4),
+            (SETTINGS_3, 3),
+            (SETTINGS_2, 2),
+        ];
         for (key, layout) in older {
             if let Some(bytes) = self.bytes(key)? {
                 if fields::read(bytes, &mut Older { settings, layout }) {
@@ -198,7 +211,7 @@ impl<F: NorFlash> Store<F> {
         let length = fields::write(settings, &mut room).ok_or(StoreFault::Full)?;
         let bytes = &room[..length];
         let mut before = 0;
-        for key in [SETTINGS_4, SETTINGS_5, SETTINGS_6, SETTINGS] {
+        for key in [SETTINGS_4, SETTINGS_5, SETTINGS_6, SETTINGS_7, SETTINGS] {
             if let Some(bytes) = self.bytes(key)? {
                 before = sum_of(Some(bytes));
             }

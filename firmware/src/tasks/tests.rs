@@ -76,7 +76,7 @@ fn answers(writes: usize) -> Vec<(Kind, u16)> {
         started_by: StartedBy::Power,
         fault: None,
     };
-    let mut server = Server::start(identity, MockFlash::erased(), &shared).expect("a store");
+    let server = Gate::new(Server::start(identity, MockFlash::erased(), &shared).expect("a store"));
     let mut received = Received(Vec::new());
     for (id, sequence) in [(GetStatus::ID, 1), (Restart::ID, 2), (GetStatus::ID, 3)] {
         let mut wire = [0; MAX_WIRE];
@@ -85,7 +85,7 @@ fn answers(writes: usize) -> Vec<(Kind, u16)> {
         received.0.extend_from_slice(&wire[..length]);
     }
     let sender = Gate::new(Sent(Vec::new(), writes));
-    block_on(pin!(link(&mut received, &sender, &mut server, &shared)));
+    block_on(pin!(link(Line::Serial, &mut received, &sender, &server, &shared)));
     frames(&sender.into_inner().0)
 }
 
@@ -107,7 +107,7 @@ fn telemetry_is_sent_until_the_port_is_gone() {
     }
     // A second topic ends it: the line takes one.
     block_on(pin!(async {
-        embassy_futures::select::select(telemetry(&sender, &shared), async {
+        embassy_futures::select::select(telemetry(&sender, &shared, |_| {}), async {
             for _ in 0..100 {
                 shared.step(&Inputs { sides: [Some(now.into()), None], ..Inputs::default() });
                 embassy_futures::yield_now().await;
@@ -117,4 +117,62 @@ fn telemetry_is_sent_until_the_port_is_gone() {
     }));
     let found = frames(&sender.into_inner().0);
     assert_eq!(found.iter().map(|(kind, _)| *kind).collect::<Vec<_>>(), [Kind::Topic]);
+}
+
+/// A line that takes nothing, without end.
+struct Stuck;
+
+impl ErrorType for Stuck {
+    type Error = ErrorKind;
+}
+
+impl Write for Stuck {
+    async fn write(&mut self, _bytes: &[u8]) -> Result<usize, ErrorKind> {
+        core::future::pending().await
+    }
+
+    async fn flush(&mut self) -> Result<(), ErrorKind> {
+        Ok(())
+    }
+}
+
+fn request(id: u8) -> Received {
+    let mut wire = [0; MAX_WIRE];
+    let header = Header { kind: Kind::Request, id, sequence: 1 };
+    let length = frame::encode(header, &(), &mut wire).expect("it fits");
+    Received(wire[..length].to_vec())
+}
+
+#[test]
+fn a_line_that_takes_nothing_does_not_hold_up_another() {
+    let shared = Shared::new(Settings::default());
+    let identity = Identity {
+        board: Board::Native,
+        muscles: 1,
+        serial: [0; 12],
+        started_by: StartedBy::Power,
+        fault: None,
+    };
+    let server = Gate::new(Server::start(identity, MockFlash::erased(), &shared).expect("a store"));
+    let (stuck, sender) = (Gate::new(Stuck), Gate::new(Sent(Vec::new(), 10)));
+    let (mut first, mut second) = (request(GetStatus::ID), request(GetStatus::ID));
+    block_on(pin!(embassy_futures::select::select(
+        link(Line::Can, &mut first, &stuck, &server, &shared),
+        link(Line::Serial, &mut second, &sender, &server, &shared),
+    )));
+    assert_eq!(frames(&sender.into_inner().0), [(Kind::Response, 1)]);
+}
+
+#[test]
+fn a_line_beside_is_offered_every_topic() {
+    let shared = Shared::new(Settings::default());
+    shared.with(|controller| controller.set_telemetry(1));
+    let sender = Gate::new(Sent(Vec::new(), 2));
+    for _ in 0..3 {
+        shared.step(&Inputs { sides: [Some(Readings::default().into()), None], ..Inputs::default() });
+    }
+    let mut offered = Vec::new();
+    block_on(pin!(telemetry(&sender, &shared, |frame| offered.extend_from_slice(frame))));
+    // The third one is offered, and ends the port.
+    assert_eq!((frames(&offered).len(), frames(&sender.into_inner().0).len()), (3, 2));
 }

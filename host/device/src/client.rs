@@ -21,7 +21,7 @@ pub use self::topics::{Losses, Topic};
 use super::line_activity::{LineActivity, version_error};
 use super::{Address, Port, VentLine, messages};
 use crate::error::DeviceCode;
-use pam_data::error::{Error, Result};
+use pam_data::error::{DataCode, Error, Result};
 
 /// A controller that has said hello and speaks our schema.
 pub struct Client {
@@ -56,6 +56,11 @@ impl Client {
     /// [`DeviceCode::DevicePort`], [`DeviceCode::DeviceSilent`] when nothing answers, [`DeviceCode::DeviceForeign`] when what answers is not
     /// a controller of ours, [`DeviceCode::DeviceVersion`] when it speaks another schema.
     pub fn open(address: &Address) -> Result<Self> {
+        if address.is_whole_bus() {
+            return Err(Error::new(DataCode::CallInvalid, "this port names all devices on a CAN bus")
+                .value(address.to_string())
+                .help("name one, 1 to 8; only `host vent` goes to all"));
+        }
         Self::connect(Port::open(address)?, Patience::default())
     }
 
@@ -66,7 +71,7 @@ impl Client {
     pub fn connect(port: Port, patience: Patience) -> Result<Self> {
         let client = Self::greet(port, patience)?;
         let hello = client.hello;
-        if hello.link_version != LINK_VERSION || hello.schema_hash != SCHEMA_HASH {
+        if !client.is_of_this_version() {
             return Err(version_error(&client.port, &hello));
         }
         Ok(client)
@@ -133,6 +138,12 @@ impl Client {
             }
         }
         Err(heard.error(&client.port))
+    }
+
+    /// Whether the device speaks this program's version of the link.
+    #[must_use]
+    pub fn is_of_this_version(&self) -> bool {
+        self.hello.link_version == LINK_VERSION && self.hello.schema_hash == SCHEMA_HASH
     }
 
     /// Every version of the device, and which device it is.

@@ -2,8 +2,10 @@
 //!
 //! | layer | where |
 //! | --- | --- |
-//! | where a device is: a serial path or `tcp:HOST:PORT` | [`Address`] |
+//! | where a device is: a serial path, `tcp:HOST:PORT`, or `slcan:ADAPTER,address=N` | [`Address`] |
 //! | bytes with time-outs | [`Port`] |
+//! | serial CAN adapters | [`slcan`] |
+//! | venting every controller on a CAN bus | [`vent_all`] |
 //! | hello, typed calls, topics, losses | [`Client`] |
 //! | tables: upload in pieces, read back | [`tables`] |
 //! | setpoints over time | [`setpoint_profile`] |
@@ -22,6 +24,7 @@
 
 mod address;
 pub mod calibration;
+mod can_line;
 mod client;
 #[cfg(feature = "emulated")]
 pub mod emulated;
@@ -37,10 +40,12 @@ pub mod recorder;
 pub mod regulator;
 pub mod run;
 pub mod setpoint_profile;
+pub mod slcan;
 mod subscription;
 pub mod table_diff;
 pub mod tables;
 pub mod update;
+mod vent_all;
 mod vent_line;
 pub mod watch;
 
@@ -48,4 +53,5 @@ pub use address::Address;
 pub use client::{Client, Losses, Patience, Topic};
 pub use port::{Port, available, plugged_in};
 pub use subscription::Subscription;
+pub use vent_all::{Answered, vent_all};
 pub use vent_line::VentLine;

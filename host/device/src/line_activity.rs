@@ -30,6 +30,11 @@ impl LineActivity {
 
     /// Why there is no controller at this port, as far as one can receive.
     pub fn error(&self, port: &Port) -> Error {
+        if self.bytes == 0
+            && let Some(troubles) = port.troubles()
+        {
+            return silent_bus(port, troubles);
+        }
         if self.bytes == 0 {
             return Error::new(DeviceCode::DeviceSilent, "nothing answers on this port")
                 .value(port.name())
@@ -65,6 +70,25 @@ impl LineActivity {
         .value(port.name())
         .help("check the port; if it is the right board, flash it first: host flash --firmware ELF --chip CHIP")
     }
+}
+
+/// Why no device answers at an address of a CAN bus.
+fn silent_bus(port: &Port, (refused, foreign): (u64, u64)) -> Error {
+    let cause = match (refused, foreign) {
+        (0, 0) => "nothing answers at this address of the CAN bus".to_owned(),
+        (0, _) => format!(
+            "no device answers, and the CAN adapter sends {} that mean nothing",
+            pluralise(foreign as usize, "line")
+        ),
+        _ => format!(
+            "no device answers, and the CAN adapter refuses {}",
+            pluralise(refused as usize, "message")
+        ),
+    };
+    Error::new(DeviceCode::DeviceSilent, cause).value(port.name()).help(
+        "check `can.address` and `can.kbit_per_s` of the controller over its serial port, that the bus has 120 Ω at both ends, and that CANH \
+         and CANL are not swapped",
+    )
 }
 
 /// The line is gone in the middle of a conversation.

@@ -4,7 +4,10 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
+use model_core::link::can;
+
 use super::Address;
+use super::can_line::CanLine;
 use crate::error::DeviceCode;
 use pam_data::error::{Error, Result};
 
@@ -23,6 +26,7 @@ pub struct Port {
 enum Line {
     Serial(Box<dyn serialport::SerialPort>),
     Tcp(TcpStream),
+    Can(Box<CanLine>),
 }
 
 impl std::fmt::Debug for Port {
@@ -55,6 +59,11 @@ impl Port {
                 Line::Serial(opened.map_err(|e| serial_error(&name, &e))?)
             }
             Address::Tcp { host, port } => Line::Tcp(connect(host, *port, &name)?),
+            Address::Can { adapter, device, kbit_per_s, baud } => {
+                // A port of the whole bus turns to each device in turn.
+                let device = device.unwrap_or(can::Address::FIRST);
+                Line::Can(Box::new(CanLine::open(Self::open_at(adapter, *baud)?, device, *kbit_per_s)?))
+            }
         };
         Ok(Self { line, name })
     }
@@ -83,6 +92,7 @@ impl Port {
         let line = match &self.line {
             Line::Serial(line) => Line::Serial(line.try_clone().map_err(|e| refused(e.to_string()))?),
             Line::Tcp(stream) => Line::Tcp(stream.try_clone().map_err(|e| refused(e.to_string()))?),
+            Line::Can(line) => Line::Can(Box::new(line.second_handle()?)),
         };
         Ok(Self { line, name: self.name.clone() })
     }
@@ -116,6 +126,7 @@ impl Port {
                     other => other,
                 }
             }
+            Line::Can(line) => line.read(buffer, patience),
         };
         match outcome {
             Err(e) if is_time_out(&e) => Ok(0),
@@ -145,6 +156,30 @@ impl Port {
                 stream.set_write_timeout(Some(Duration::from_secs(1)))?;
                 stream.write_all(bytes)
             }
+            Line::Can(line) => line.write_all(bytes),
+        }
+    }
+
+    /// Turns the line to another device on the same CAN bus.
+    pub(super) fn turn_to(&mut self, device: can::Address) {
+        if let Line::Can(line) = &mut self.line {
+            line.turn_to(device);
+        }
+    }
+
+    /// Sends the message that vents every device on a CAN bus.
+    pub(super) fn vent_all(&mut self) -> io::Result<()> {
+        match &mut self.line {
+            Line::Can(line) => line.vent_all(),
+            Line::Serial(_) | Line::Tcp(_) => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+
+    /// On a CAN bus: messages that the adapter has refused, and lines of it that say nothing.
+    pub(super) fn troubles(&self) -> Option<(u64, u64)> {
+        match &self.line {
+            Line::Can(line) => Some(line.troubles()),
+            Line::Serial(_) | Line::Tcp(_) => None,
         }
     }
 }

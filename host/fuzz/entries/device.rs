@@ -10,7 +10,7 @@
 use firmware::board::{Command, Hardware, Identity, Inputs, Outputs, Readings};
 use firmware::control::Controller;
 use firmware::native::MemoryFlash;
-use firmware::server::Server;
+use firmware::server::{Line, Server};
 use firmware::shared::Shared;
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_BODY, MAX_TOPIC, MAX_WIRE, encode_bytes};
 use model_core::link::hello::Board;
@@ -56,7 +56,7 @@ impl Device {
 
     fn hear(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            self.server.note_counts(self.accumulator.counts());
+            self.server.note_counts(Line::Serial, self.accumulator.counts());
             let Some(Ok(request)) = self.accumulator.push_to_answer(byte) else { continue };
             let answer = self.server.handle(request, &self.shared);
             assert!(answer.is_empty() || is_frame(answer), "an answer is a frame");

@@ -13,7 +13,7 @@ use pam_device::{Address, Client, Patience, Port, plugged_in};
 /// Which device.
 #[derive(Debug, Clone, Args)]
 pub struct PortOption {
-    /// A serial device, or tcp:HOST:PORT for an emulated one [default: the only USB serial device that is a controller].
+    /// A serial device, tcp:HOST:PORT for an emulated one, or slcan:ADAPTER,address=N on a CAN bus [default: the only USB serial device that is a controller].
     #[arg(short, long, value_name = "PORT", env = "PAM_PORT")]
     port: Option<String>,
 }

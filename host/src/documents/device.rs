@@ -43,6 +43,7 @@ pub(crate) struct Status {
     pub telemetry_dropped: u32,
     pub saturated_ticks: u32,
     pub line_errors: u32,
+    pub bus_offs: u32,
 }
 
 /// `host device faults --json`.

@@ -1,33 +1,65 @@
-//! Frames of the link on CAN FD: one to eight devices on one bus, each with an address.
+//! Frames of the link on CAN: one to eight devices on one bus, each with an address.
 //!
-//! A message of CAN FD carries up to [`PAYLOAD`] bytes. The bytes of the link, as on any other line, are cut into messages and put
-//! together again. A frame's check sum and its closing zero find what is lost, as on a serial line.
+//! The bytes of the link, as on any other line, are cut into messages and put together again. A frame's check sum and its closing zero
+//! find what is lost, as on a serial line. A bus has messages of one [`Format`].
 //!
-//! | byte of a message | contents |
-//! | --- | --- |
-//! | 0 | number of the message, counted by its sender for each route, wrapping |
-//! | 1 | bytes of the link that follow, 1 to [`DATA`] |
-//! | 2… | these bytes, and zeros up to the next length that CAN FD has |
+//! | format | longest message | byte 0 | byte 1 | then |
+//! | --- | --- | --- | --- | --- |
+//! | CAN FD | 64 | number | bytes of the link, 1 to 62 | these bytes, and zeros up to the next length that CAN FD has |
+//! | classic CAN | 8 | number | 1 to 7 bytes of the link: the message's own length says how many | |
+//!
+//! The number is counted by the sender for each route, wrapping.
 //!
 //! | identifier (11 bits) | [`Route`] |
 //! | --- | --- |
-//! | `0x010` | from the host to all devices, before all else on the bus: frames of one message, to vent |
+//! | `0x010` | from the host to all devices, before all else on the bus, to vent: frames of one message, or [`VENT`] |
 //! | `0x100 + address` | from the host to one device |
 //! | `0x200 + address` | from a device to the host |
 //!
 //! Source of the lengths and of arbitration by the lower identifier: ISO 11898-1:2015. A message whose end is disturbed may arrive twice
 //! (the transmitter repeats it), which its number shows.
 
-/// Longest message.
+/// Longest message of CAN FD, and of any format.
 pub const PAYLOAD: usize = 64;
-/// Bytes of the link that a message carries at most.
-pub const DATA: usize = PAYLOAD - HEAD;
-/// Number and length.
-const HEAD: usize = 2;
+/// Longest message of classic CAN.
+pub const CLASSIC: usize = 8;
 /// Devices on one bus.
 pub const DEVICES: u8 = 8;
 /// Lengths that a message of CAN FD can have, beyond 8.
 const LENGTHS: [usize; 7] = [12, 16, 20, 24, 32, 48, 64];
+
+/// On classic CAN the one message to all devices: stop, vent and disarm, whatever they are doing. The requests `stop` and `disarm` with
+/// their check sums do not fit its 8 bytes. All 64 bits must be right, twice as many as the check sum of a frame has. It has no number:
+/// a device that takes it twice vents twice.
+pub const VENT: [u8; CLASSIC] = *b"VENT all";
+
+/// What a bus carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Format {
+    /// CAN FD.
+    #[default]
+    Fd,
+    /// Classic CAN.
+    Classic,
+}
+
+impl Format {
+    /// Bytes of the link that a message carries at most.
+    pub const fn data(self) -> usize {
+        match self {
+            Self::Fd => PAYLOAD - self.head(),
+            Self::Classic => CLASSIC - self.head(),
+        }
+    }
+
+    /// The number, and a length where the message's own does not say it.
+    const fn head(self) -> usize {
+        match self {
+            Self::Fd => 2,
+            Self::Classic => 1,
+        }
+    }
+}
 
 const TO_ALL: u16 = 0x010;
 const TO_DEVICE: u16 = 0x100;
@@ -38,6 +70,9 @@ const FROM_DEVICE: u16 = 0x200;
 pub struct Address(u8);
 
 impl Address {
+    /// The first.
+    pub const FIRST: Self = Self(1);
+
     /// The address of a number, if there is one.
     pub const fn new(number: u8) -> Option<Self> {
         if number >= 1 && number <= DEVICES { Some(Self(number)) } else { None }
@@ -91,19 +126,28 @@ impl Route {
 /// The sender of one route.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sender {
+    format: Format,
     number: u8,
 }
 
 impl Sender {
+    /// A sender of messages of a format.
+    pub const fn new(format: Format) -> Self {
+        Self { format, number: 0 }
+    }
+
     /// Cuts bytes of the link, such as a whole frame with its closing zero, into messages.
     pub fn send(&mut self, bytes: &[u8], mut message: impl FnMut(&[u8])) {
-        for piece in bytes.chunks(DATA) {
+        let head = self.format.head();
+        for piece in bytes.chunks(self.format.data()) {
             let mut payload = [0; PAYLOAD];
             payload[0] = self.number;
-            payload[1] = piece.len() as u8;
-            payload[HEAD..HEAD + piece.len()].copy_from_slice(piece);
+            if self.format == Format::Fd {
+                payload[1] = piece.len() as u8;
+            }
+            payload[head..head + piece.len()].copy_from_slice(piece);
             self.number = self.number.wrapping_add(1);
-            message(&payload[..padded(HEAD + piece.len())]);
+            message(&payload[..padded(head + piece.len())]);
         }
     }
 }
@@ -130,11 +174,17 @@ pub struct Counts {
 /// The receiver of one route.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Receiver {
+    format: Format,
     expected: Option<u8>,
     counts: Counts,
 }
 
 impl Receiver {
+    /// A receiver of messages of a format.
+    pub const fn new(format: Format) -> Self {
+        Self { format, expected: None, counts: Counts { lost: 0, repeated: 0, malformed: 0 } }
+    }
+
     /// Takes a message; gives its bytes of the link. Behind a gap a zero comes first, which ends the frame that is not whole.
     pub fn take<'a>(&mut self, payload: &'a [u8]) -> impl Iterator<Item = u8> + use<'a> {
         let bytes = self.accept(payload);
@@ -148,7 +198,7 @@ impl Receiver {
     }
 
     fn accept<'a>(&mut self, payload: &'a [u8]) -> Option<(bool, &'a [u8])> {
-        let Some((number, bytes)) = parse(payload) else {
+        let Some((number, bytes)) = parse(payload, self.format) else {
             self.counts.malformed = self.counts.malformed.wrapping_add(1);
             return None;
         };
@@ -164,11 +214,13 @@ impl Receiver {
 }
 
 /// Number and bytes of a message.
-fn parse(payload: &[u8]) -> Option<(u8, &[u8])> {
+fn parse(payload: &[u8], format: Format) -> Option<(u8, &[u8])> {
     let (&number, rest) = payload.split_first()?;
-    let (&length, rest) = rest.split_first()?;
-    let length = usize::from(length);
-    if length == 0 || length > DATA || payload.len() != padded(HEAD + length) {
+    let (length, rest) = match format {
+        Format::Classic => (rest.len(), rest),
+        Format::Fd => rest.split_first().map(|(&length, rest)| (usize::from(length), rest))?,
+    };
+    if length == 0 || length > format.data() || payload.len() != padded(format.head() + length) {
         return None;
     }
     Some((number, rest.get(..length)?))

@@ -250,7 +250,7 @@ mod tests {
     /// and write the new hash here.
     #[test]
     fn the_schema_changes_only_on_purpose() {
-        assert_eq!(SCHEMA_HASH, 0xb818_ffa8_81a7_cd33, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0xe738_8c4f_e542_19e0, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]

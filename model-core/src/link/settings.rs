@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::fields::{codes, fields};
 
+mod can;
 mod valves;
 
+pub use can::CanLine;
 pub use valves::ValvePair;
 
 codes! {
@@ -326,6 +328,8 @@ pub struct Settings {
     pub command: CommandOutput,
     /// A pair of on/off valves in place of the regulator.
     pub valves: ValvePair,
+    /// The line to a CAN bus.
+    pub can: CanLine,
 }
 
 fields!(Settings {
@@ -344,7 +348,8 @@ fields!(Settings {
     pressure_band_pa,
     scales,
     command,
-    valves
+    valves,
+    can
 });
 
 impl Settings {
@@ -424,6 +429,7 @@ impl Settings {
         },
         command: CommandOutput { low: 0.0, full_pa: 2e6 },
         valves: ValvePair::NONE,
+        can: CanLine::OFF,
     };
 }
 

@@ -274,3 +274,16 @@ fn the_scale_of_a_sensor_that_is_not_there_is_a_number_all_the_same() {
         assert_eq!(found(&Hardware::SIMULATED, no_pressure), None);
     }
 }
+
+#[test]
+fn a_place_on_a_bus_needs_a_controller_an_address_and_a_common_bit_rate() {
+    let with = Hardware { can: true, ..BOARD };
+    for address in 0..=u8::MAX {
+        let wrong = (address > 8).then_some(Field::Can);
+        assert_eq!(found(&with, |s| s.can.address = address), wrong, "{address}");
+    }
+    assert_eq!(found(&BOARD, |s| s.can.address = 1), Some(Field::Can), "without a controller");
+    let rates: std::vec::Vec<u16> =
+        (0..=u16::MAX).filter(|rate| found(&with, |s| s.can.kbit_per_s = *rate).is_none()).collect();
+    assert_eq!(rates, [125, 250, 500, 1000]);
+}

@@ -22,7 +22,8 @@ fn with_table(shared: &Shared) -> Server<MockFlash> {
 fn the_status_and_the_device_are_described_as_they_are() {
     let shared = Shared::new(Settings::default());
     let mut server = with_table(&shared);
-    server.note_counts(frame::Counts { good: 3, bad: 2 });
+    server.note_counts(Line::Serial, frame::Counts { good: 2, bad: 2 });
+    server.note_counts(Line::Can, frame::Counts { good: 1, bad: 0 });
     let mut answers = Answers { server: &mut server, shared: &shared };
     let mut info = DeviceInfo::default();
     assert_eq!(answers.info(&(), &mut info), Ok(()));

@@ -1,9 +1,9 @@
-//! Eight devices on one CAN bus: each answers for itself, and one message vents all.
+//! Eight devices on one CAN bus of either format: each answers for itself, and one message vents all.
 
 use std::vec::Vec;
 
 use model_core::link::Endpoint;
-use model_core::link::can::{Address, DATA, Receiver, Route, Sender};
+use model_core::link::can::{Address, Format, Receiver, Route, Sender, VENT};
 use model_core::link::endpoints::{Arm, Disarm, GetSettings, GetStatus, SetTo, StartMode, Stop};
 use model_core::link::frame::{Accumulator, MAX_WIRE, encode};
 use model_core::link::messages::Start;
@@ -20,20 +20,27 @@ struct Device {
     own: (Receiver, Accumulator),
     all: (Receiver, Accumulator),
     sender: Sender,
+    format: Format,
     pressure_pa: f32,
 }
 
 impl Device {
-    fn new(address: Address) -> Self {
+    fn new(address: Address, format: Format) -> Self {
         let shared = Shared::new(Settings::default());
         let server = started(MockFlash::erased(), &shared);
-        let [own, all] = [(); 2].map(|()| (Receiver::default(), Accumulator::new()));
-        Self { address, shared, server, own, all, sender: Sender::default(), pressure_pa: 0.0 }
+        let [own, all] = [(); 2].map(|()| (Receiver::new(format), Accumulator::new()));
+        Self { address, shared, server, own, all, sender: Sender::new(format), format, pressure_pa: 0.0 }
     }
 
     fn take(&mut self, (identifier, payload): &Message, bus: &mut Vec<Message>) {
-        let Self { address, shared, server, own, all, sender, .. } = self;
+        let Self { address, shared, server, own, all, sender, format, .. } = self;
         let (receiver, accumulator) = match Route::of(*identifier) {
+            Some(Route::ToAll) if *format == Format::Classic => {
+                if payload[..] == VENT {
+                    shared.vent();
+                }
+                return;
+            }
             Some(Route::ToAll) => all,
             Some(Route::To(to)) if to == *address => own,
             _ => return,
@@ -62,14 +69,14 @@ struct Bus {
 }
 
 impl Bus {
-    fn new() -> Self {
-        let devices: Vec<Device> = Address::all().map(Device::new).collect();
-        let line = || (Receiver::default(), Accumulator::new());
+    fn new(format: Format) -> Self {
+        let devices: Vec<Device> = Address::all().map(|address| Device::new(address, format)).collect();
+        let line = || (Receiver::new(format), Accumulator::new());
         Self {
-            to: devices.iter().map(|_| Sender::default()).collect(),
+            to: devices.iter().map(|_| Sender::new(format)).collect(),
             from: devices.iter().map(|_| line()).collect(),
             devices,
-            to_all: Sender::default(),
+            to_all: Sender::new(format),
             sequence: 0,
         }
     }
@@ -125,9 +132,32 @@ impl Bus {
     }
 }
 
+/// Both requests in one message, which nothing can interrupt; on classic CAN the one in their place.
+fn vent_message(bus: &mut Bus, format: Format) -> Message {
+    let mut wire = [0; MAX_WIRE];
+    let mut length = 0;
+    for id in [Stop::ID, Disarm::ID] {
+        let header = Header { kind: Kind::Request, id, sequence: 1 };
+        length += encode(header, &(), &mut wire[length..]).expect("a frame");
+    }
+    let identifier = Route::ToAll.identifier();
+    if format == Format::Classic {
+        return (identifier, VENT.to_vec());
+    }
+    assert!(length <= Format::Fd.data(), "{length} bytes");
+    let mut sent = Vec::new();
+    bus.to_all.send(&wire[..length], |message| sent.push((identifier, message.to_vec())));
+    assert_eq!(sent.len(), 1);
+    sent.remove(0)
+}
+
 #[test]
 fn each_device_answers_for_itself_and_one_message_vents_all() {
-    let mut bus = Bus::new();
+    [Format::Fd, Format::Classic].into_iter().for_each(one_message_vents_all);
+}
+
+fn one_message_vents_all(format: Format) {
+    let mut bus = Bus::new(format);
     bus.pass(5);
     for at in 0..bus.devices.len() {
         bus.ask::<Arm>(at, &OWNER, None).expect("an answer");
@@ -141,29 +171,23 @@ fn each_device_answers_for_itself_and_one_message_vents_all() {
         let wanted = 100e3 + 10e3 * at as f32;
         assert!((device.pressure_pa - wanted).abs() < 2e3, "{at}: {}", device.pressure_pa);
     }
-    // Both requests in one message, which nothing can interrupt.
-    let mut wire = [0; MAX_WIRE];
-    let mut length = 0;
-    for id in [Stop::ID, Disarm::ID] {
-        let header = Header { kind: Kind::Request, id, sequence: 1 };
-        length += encode(header, &(), &mut wire[length..]).expect("a frame");
-    }
-    assert!(length <= DATA, "{length} bytes");
-    let mut sent = Vec::new();
-    let sender = &mut bus.to_all;
-    sender.send(&wire[..length], |message| sent.push((Route::ToAll.identifier(), message.to_vec())));
-    assert_eq!(sent.len(), 1);
-    let answers = bus.carry(&sent, None);
+    let vent = vent_message(&mut bus, format);
+    let answers = bus.carry(&[vent], None);
     for device in &bus.devices {
         assert!(device.state() == State::Disarmed && device.shared.with(|controller| controller.is_vented()));
         let back = Route::From(device.address).identifier();
-        assert!(answers.iter().any(|(identifier, _)| *identifier == back));
+        let answered = answers.iter().any(|(identifier, _)| *identifier == back);
+        assert_eq!(answered, format == Format::Fd);
     }
 }
 
 #[test]
 fn an_answer_that_lost_a_message_is_asked_for_again() {
-    let mut bus = Bus::new();
+    [Format::Fd, Format::Classic].into_iter().for_each(each_is_asked_for_again);
+}
+
+fn each_is_asked_for_again(format: Format) {
+    let mut bus = Bus::new(format);
     for lost in 0..3 {
         assert!(bus.ask::<GetSettings>(4, &(), Some(lost)).is_none(), "message {lost}");
         assert_eq!(bus.ask::<GetSettings>(4, &(), None), Some(Settings::default()));

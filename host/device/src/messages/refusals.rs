@@ -54,6 +54,8 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
                 Field::Valves => "a pair of valves needs a board with outputs for it, a pressure sensor, `regulator.lag_s` of two \
                                   periods or more, and a supply above `regulator.command_max_pa`; the book lists the ranges"
                     .to_owned(),
+                Field::Can => "`can.address` is 0 to 8 and needs a board with a CAN controller; `can.kbit_per_s` is 125, 250, 500 or 1000"
+                    .to_owned(),
                 _ => "`host device settings` shows the values in force".to_owned(),
             },
         ),
@@ -188,6 +190,7 @@ const fn field_name(field: Field) -> &'static str {
         Field::Scale => "the scale or the filter of a sensor",
         Field::Command => "the output to the pressure regulator",
         Field::Valves => "the setting `valves`",
+        Field::Can => "the setting `can`",
         Field::Rate => "the rate of telemetry or of a trace",
     }
 }
@@ -209,6 +212,8 @@ mod tests {
         let error = refused("set_settings", Refusal::Value(Field::Valves));
         assert!(error.to_string().contains("the setting `valves`"), "{error}");
         assert!(error.advice().is_some_and(|advice| advice.contains("a board with outputs for it")));
+        let error = refused("set_settings", Refusal::Value(Field::Can));
+        assert!(error.advice().is_some_and(|advice| advice.contains("125, 250, 500 or 1000")));
         let error = refused("set_point", Refusal::Angle { low_rad: -0.1, high_rad: 0.1 });
         assert!(error.to_string().ends_with("taut from -5.7° to 5.7° only"), "{error}");
     }

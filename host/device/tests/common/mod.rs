@@ -206,6 +206,7 @@ fn status() -> Status {
         telemetry_dropped: 0,
         saturated_ticks: 0,
         line_errors: 0,
+        bus_offs: 0,
         tables: Default::default(),
     }
 }

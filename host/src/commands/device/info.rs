@@ -97,6 +97,7 @@ fn document(hello: &Hello, info: &DeviceInfo, status: &Status, settings: &Settin
             telemetry_dropped: status.telemetry_dropped,
             saturated_ticks: status.saturated_ticks,
             line_errors: status.line_errors,
+            bus_offs: status.bus_offs,
         },
     }
 }

@@ -76,6 +76,8 @@ pub struct Status {
     pub saturated_ticks: u32,
     /// Times that received bytes were lost: the receiver was not read in time, or the line was disturbed.
     pub line_errors: u32,
+    /// Times that the CAN controller was off the bus after too many errors (bus-off), and came back on its own.
+    pub bus_offs: u32,
     /// Whether the tables still describe their muscles.
     pub tables: [TableHealth; 2],
 }
@@ -92,5 +94,6 @@ fields!(Status {
     telemetry_dropped,
     saturated_ticks,
     line_errors,
+    bus_offs,
     tables
 });

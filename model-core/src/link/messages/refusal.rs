@@ -104,9 +104,11 @@ pub enum Field {
     Command,
     /// Pair of on/off valves.
     Valves,
+    /// Line to a CAN bus.
+    Can,
 }
 
-one_of!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {}, 11 Scale {}, 12 Command {}, 13 Valves {} });
+one_of!(Field { 0 SetPoint {}, 1 Reference {}, 2 ForceLoop {}, 3 StrokeLoop {}, 4 Joint {}, 5 Regulator {}, 6 Limits {}, 7 SensorWatch {}, 8 Watch {}, 9 Bands {}, 10 Rate {}, 11 Scale {}, 12 Command {}, 13 Valves {}, 14 Can {} });
 
 /// Why a table is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
