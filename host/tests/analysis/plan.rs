@@ -120,7 +120,8 @@ fn a_plan_is_the_choice_of_the_campaign() {
     assert!(!from_files.unwrap().plan(2, 1e4).steps.is_empty());
 }
 
-/// Nobody knows the free stroke before the muscle has moved: a length at which it hangs slack is no recording, and the next is longer.
+/// The free stroke is unknown before the muscle has moved. A recording at a length at which it hangs slack does not count, and the next
+/// length is longer.
 #[test]
 fn lengths_set_by_hand_come_back_from_where_the_muscle_hangs_slack() {
     use pam_campaign::engine::{Engine, Purpose};

@@ -114,7 +114,7 @@ pub struct Asking {
     pub limit: Duration,
     /// Trials that are not begun by then stay unanswered.
     pub until: Option<Instant>,
-    /// Whether diagnosed tables are asked for, where the tool makes them.
+    /// Whether the tool writes diagnosed tables, where it makes them.
     pub tables: bool,
     /// Variables of the tool's environment.
     pub environment: Vec<(&'static str, String)>,

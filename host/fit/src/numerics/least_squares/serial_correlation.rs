@@ -1,4 +1,4 @@
-//! Blocks that follow each other share the slow part of the noise: then their errors are no independent samples.
+//! Blocks that follow each other share the slow part of the noise: their errors are then correlated.
 //!
 //! The noise is taken for an exponentially correlated one, `ρ(d) = exp(−d/τ)`. Its time τ comes from the residuals; with it follows what
 //! the coefficients vary by, beyond what a jackknife of independent blocks says, and how many independent blocks the residuals are worth
@@ -133,7 +133,7 @@ pub(super) fn correlated(
     let together = blocks.covariance(tau);
     let alone = DMatrix::from_diagonal(&together.diagonal());
     let weight = DMatrix::from_diagonal(&DVector::from_vec(blocks.rows.clone()));
-    // What is left of the noise after the fit, weighted as the fit weighs it.
+    // The residual of the noise after the fit, weighted as the fit weighs it.
     let squares = |v: &DMatrix<f64>| &weight * &left * v * left.transpose();
     let (spread, spread_alone) = (squares(&together), squares(&alone));
     let seen = spread.trace() / spread_alone.trace();
