@@ -209,6 +209,26 @@ fn channels_are_told_apart_by_what_they_record() {
 }
 
 #[test]
+fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
+    let file = |kpa: f64| -> Vec<u8> {
+        let rows =
+            stroke(|[t, _, x, f]| format!("{t:.2},{:.1},{:.1},{x:.3},{f:.3}", 700.0 + 2.0 * t, kpa + t));
+        format!("time_s,p1 (kPa),p2 (kPa),displacement_mm,force_N\n{rows}").into()
+    };
+    let (guess, recordings) = read(&[("a.csv", file(200.0)), ("b.csv", file(400.0))]);
+    let pressures: Vec<f64> = recordings.unwrap().iter().map(|r| (r.pressure[0] * 1e-3).round()).collect();
+    assert_eq!(pressures, [200.0, 400.0]);
+    assert!(
+        guess.checks.iter().any(|c| c.contains("p2 (kPa); p1 (kPa) could be meant")),
+        "{:?}",
+        guess.checks
+    );
+    // One file at one pressure says nothing of either.
+    let (_, recordings) = read(&[("a.csv", file(200.0))]);
+    assert_eq!((recordings.unwrap()[0].pressure[0] * 1e-3).round(), 700.0);
+}
+
+#[test]
 fn what_a_file_lacks_is_told_with_the_right_remedy() {
     let told = |text: String| read(&[("a_300kPa.csv", text.into())]).0.unknown.join("; ");
     let head = "time_s,pressure_kPa,displacement_mm,force_N\n";

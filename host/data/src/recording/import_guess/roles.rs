@@ -48,7 +48,7 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
         if stroke.contains(&quantity) && stroke.iter().any(|q| guess.has(*q)) {
             continue;
         }
-        if let Some(n) = best(sample, quantity, &used, &mut guess)
+        if let Some(n) = best(sample, quantity, &used, others, &mut guess)
             && let Some(column) = described(sample, n, quantity, others, &mut guess)
         {
             used[n] = true;
@@ -83,7 +83,13 @@ pub(super) fn source(sample: &Sample, n: usize) -> Source {
 }
 
 /// The column that fits a quantity best.
-fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -> Option<usize> {
+fn best(
+    sample: &Sample,
+    quantity: Quantity,
+    used: &[bool],
+    others: &Others<'_>,
+    guess: &mut Guess,
+) -> Option<usize> {
     let fits = |(n, c): (usize, &SampleColumn)| -> Option<(Score, usize)> {
         let (q, score) = c.name.quantity()?;
         (q == quantity && c.is_numeric() && !used[n]).then_some((score, n))
@@ -91,7 +97,9 @@ fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -
     let mut found: Vec<(Score, usize)> = sample.columns.iter().enumerate().filter_map(fits).collect();
     // A load cell that reads one value throughout is not connected.
     let dead = |n: usize| quantity == Quantity::Force && values::is_constant(&sample.columns[n]);
-    found.sort_by_key(|(score, n)| (dead(*n), -score, *n));
+    // A pressure that is the same in all files is that of the supply, where another one differs.
+    let steady = |n: usize| quantity == Quantity::Pressure && is_steady(&sample.columns[n], others);
+    found.sort_by_cached_key(|(score, n)| (dead(*n), -score, steady(*n), *n));
     let (score, first) = *found.first()?;
     let competitors: Vec<&str> = found[1..]
         .iter()
@@ -114,6 +122,18 @@ fn best(sample: &Sample, quantity: Quantity, used: &[bool], guess: &mut Guess) -
         ));
     }
     Some(first)
+}
+
+/// Whether all files hold the same value in this column, but for noise.
+fn is_steady(column: &SampleColumn, others: &Others<'_>) -> bool {
+    /// Share of the largest value: a regulator holds its supply within some per cent, and levels of a campaign differ by more.
+    const SAME: f64 = 0.05;
+    let own = column.range();
+    let (low, high) = others
+        .ranges(&column.header)
+        .iter()
+        .fold(own, |(low, high), other| (low.min(other.low), high.max(other.high)));
+    high - low <= SAME * high.abs().max(low.abs())
 }
 
 /// A column in its unit; `None` where it cannot be used.
