@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::Options;
+use super::design::Row;
 use super::errors::{chunks, errors};
+use super::normal_equations::NormalEquations;
 use super::smoothing;
 use super::solution::Solution;
 use pam_data::progress::Progress;
@@ -15,11 +17,12 @@ pub(super) fn predict_left_out(
     options: &Options,
     progress: &dyn Progress,
 ) -> Vec<Option<f64>> {
-    let groups = solution.problem.design.groups;
+    let design = &solution.problem.design;
+    let groups = design.groups;
     let used: Vec<bool> = {
         let mut used = vec![false; groups];
-        for (row, w) in solution.problem.design.rows.iter().zip(&solution.weights) {
-            used[solution.problem.design.bins[row.bin as usize].group as usize] |= *w > 0.0;
+        for (row, w) in design.rows.iter().zip(&solution.weights) {
+            used[design.bins[row.bin as usize].group as usize] |= *w > 0.0;
         }
         used
     };
@@ -27,6 +30,9 @@ pub(super) fn predict_left_out(
         return vec![None; groups];
     }
     progress.stage("predicting each pressure from the others", groups as u64);
+    // Leaving a group out leaves the sums of the other bins as they are.
+    let sums = design.bin_sums(&solution.parameters, &solution.weights);
+    let by_group = design.normal_by_group(&sums);
     (0..groups)
         .into_par_iter()
         .map(|g| {
@@ -34,26 +40,22 @@ pub(super) fn predict_left_out(
                 progress.step();
                 return None;
             }
-            let weights: Vec<f64> = solution
-                .problem
-                .design
-                .rows
-                .iter()
-                .zip(&solution.weights)
-                .map(|(row, w)| {
-                    if solution.problem.design.bins[row.bin as usize].group as usize == g { 0.0 } else { *w }
-                })
-                .collect();
+            let without = |(row, w): (&Row, &f64)| {
+                if design.bins[row.bin as usize].group as usize == g { 0.0 } else { *w }
+            };
+            let weights: Vec<f64> = design.rows.iter().zip(&solution.weights).map(without).collect();
             let mut parameters = solution.parameters.clone();
             let smoothing = if options.smoothing.is_some() {
                 solution.smoothing
             } else {
-                smoothing::choose(&solution.problem.design, &parameters, &weights).0
+                let mut others = by_group.clone();
+                others[g] = NormalEquations::zeros(design.layout().len());
+                smoothing::choose(design, &parameters, &others, smoothing::weighted(&weights)).0
             };
-            let data = solution.problem.design.normal(&parameters, &weights);
-            let penalty = solution.problem.design.penalty(&data, smoothing.elastic, smoothing.friction);
-            solution.problem.design.solve_from(data, &mut parameters, &weights, &penalty, 6);
-            let residuals = solution.problem.design.residuals(&parameters);
+            let data = design.normal_of_groups(&sums, |group| group != g);
+            let penalty = design.penalty(&data, smoothing.elastic, smoothing.friction);
+            design.solve_from(data, &mut parameters, &weights, &penalty, 6);
+            let residuals = design.residuals(&parameters);
             let chunks = chunks(solution, &residuals, |group| group as usize == g);
             progress.step();
             (!chunks.is_empty()).then(|| errors(&chunks, |_| true).mean)

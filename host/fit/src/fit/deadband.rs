@@ -81,10 +81,14 @@ fn by_order(
     let parameters = finer.solve(&finer.design.start(near), weights, Smoothing::START, 8);
     let smoothing = match options.smoothing {
         Some(weight) => Smoothing { elastic: weight, friction: weight },
-        None => smoothing::choose(&finer.design, &parameters, weights).0,
+        None => {
+            let groups = finer.design.normal_by_group(&finer.design.bin_sums(&parameters, weights));
+            smoothing::choose(&finer.design, &parameters, &groups, smoothing::weighted(weights)).0
+        }
     };
     let (weights, parameters) = robust(&finer, screen, weights, parameters, smoothing);
-    let penalty = finer.penalty(&parameters, &weights, smoothing);
-    let root = jackknife_root(&finer, screen, &weights, &parameters, &penalty);
+    let data = finer.design.normal(&parameters, &weights);
+    let penalty = finer.penalty(&data, smoothing);
+    let root = jackknife_root(&finer, screen, &weights, &parameters, (&data, &penalty));
     Some(Deadband { value: finer.deadband(&parameters), std: root.std(Layout::DEADBAND) })
 }

@@ -212,8 +212,10 @@ impl Search<'_> {
         self.restore_forces();
         let size = self.parameters.len() - at.len();
         self.parameters[size..].fill(0.0);
-        let penalty = self.problem.penalty(&self.parameters, self.weights, Smoothing::START);
-        let misfit = self.problem.design.solve(&mut self.parameters, self.weights, &penalty, 6).misfit;
+        let data = self.problem.design.normal(&self.parameters, self.weights);
+        let penalty = self.problem.penalty(&data, Smoothing::START);
+        let design = &self.problem.design;
+        let misfit = design.solve_from(data, &mut self.parameters, self.weights, &penalty, 6).misfit;
         let prior = self.unknowns.prior(at, self.excess);
         Solved { misfit, objective: misfit + penalty.quadratic(&self.parameters) + prior }
     }
@@ -295,8 +297,9 @@ impl Search<'_> {
 
     /// The problem with the found dimensions fixed, and the table's `size` parameters there.
     fn finish(mut self, screen: &Screen, size: usize) -> (Problem, Vec<f64>) {
-        let penalty = self.problem.penalty(&self.parameters, self.weights, Smoothing::START);
-        let root = jackknife_root(&self.problem, screen, self.weights, &self.parameters, &penalty);
+        let data = self.problem.design.normal(&self.parameters, self.weights);
+        let penalty = self.problem.penalty(&data, Smoothing::START);
+        let root = jackknife_root(&self.problem, screen, self.weights, &self.parameters, (&data, &penalty));
         self.restore_forces();
         let Self { unknowns, weights, mut problem, mut parameters, at, .. } = self;
         let found = || unknowns.list.iter().zip(&at).enumerate();

@@ -167,6 +167,34 @@ pub(crate) mod tests {
         }
     }
 
+    #[test]
+    fn leaving_a_group_out_of_the_sums_is_giving_its_points_no_weight() {
+        let (mut design, mut at) = known(4);
+        at[3] += 0.7;
+        // Points of all pressures in turn, so that the sums of a bin are not those of one stretch of rows.
+        let n = design.rows.len();
+        design.rows = (0..n).map(|i| design.rows[i * 77 % n]).collect();
+        let weights: Vec<f64> = (0..n).map(|i| 0.3 + (i % 4) as f64).collect();
+        let sums = design.bin_sums(&at, &weights);
+        let bits = |of: &NormalEquations| -> Vec<u64> {
+            let all = of.matrix.a.iter().chain(&of.right).chain([&of.misfit, &of.weight]);
+            all.map(|v| v.to_bits()).collect()
+        };
+        for left_out in 0..design.groups {
+            let group = |i: usize| design.bins[design.rows[i].bin as usize].group as usize;
+            let without: Vec<f64> =
+                (0..n).map(|i| if group(i) == left_out { 0.0 } else { weights[i] }).collect();
+            let direct = design.normal(&at, &without);
+            assert!(direct.weight > 0.0);
+            let by_sums = design.normal_of_groups(&sums, |g| g != left_out);
+            assert_eq!(bits(&by_sums), bits(&direct), "group {left_out}");
+        }
+        assert_eq!(
+            bits(&design.normal_of_groups(&sums, |_| true)),
+            bits(&design.normal_of(0..n, &at, &design.curves(&at), &weights))
+        );
+    }
+
     fn assert_sums(design: &Design, at: &[f64]) {
         let weights: Vec<f64> = (0..design.rows.len()).map(|i| (i % 4) as f64).collect();
         let normal = design.normal(at, &weights);

@@ -54,6 +54,10 @@ struct Fixed<const D: usize> {
     weight: f64,
 }
 
+/// The sums of all bins at some parameters and weights. One pass over the points gives them; the normal equations of all points, of each
+/// group, and of all groups but one follow without another.
+pub(crate) struct BinSums(Vec<(u32, Sums)>);
+
 /// Where sums are taken.
 struct At<'a> {
     rows: Range<usize>,
@@ -219,10 +223,29 @@ impl Design {
         }
     }
 
+    /// The sums over all points.
+    #[must_use]
+    pub(crate) fn bin_sums(&self, parameters: &[f64], weights: &[f64]) -> BinSums {
+        BinSums(self.sums(0..self.rows.len(), parameters, &self.curves(parameters), weights))
+    }
+
+    /// The normal equations of the groups that `take` chooses: as if the weights of all other points were zero.
+    #[must_use]
+    pub(crate) fn normal_of_groups(&self, sums: &BinSums, take: impl Fn(usize) -> bool) -> NormalEquations {
+        let mut normal = NormalEquations::zeros(self.layout().len());
+        for (bin, s) in &sums.0 {
+            let bin = &self.bins[*bin as usize];
+            if take(bin.group as usize) {
+                self.expand(s, &bin.phi, &mut normal);
+            }
+        }
+        normal
+    }
+
     /// The normal equations of all points.
     #[must_use]
     pub fn normal(&self, parameters: &[f64], weights: &[f64]) -> NormalEquations {
-        self.normal_of(0..self.rows.len(), parameters, &self.curves(parameters), weights)
+        self.normal_of_groups(&self.bin_sums(parameters, weights), |_| true)
     }
 
     /// The normal equations of a stretch of points. `curves` are those of `parameters`.
@@ -243,12 +266,12 @@ impl Design {
 
     /// The normal equations of each group alone.
     #[must_use]
-    pub(crate) fn normal_by_group(&self, parameters: &[f64], weights: &[f64]) -> Vec<NormalEquations> {
+    pub(crate) fn normal_by_group(&self, sums: &BinSums) -> Vec<NormalEquations> {
         let mut normals = vec![NormalEquations::zeros(self.layout().len()); self.groups];
-        for (bin, s) in self.sums(0..self.rows.len(), parameters, &self.curves(parameters), weights) {
-            let bin = &self.bins[bin as usize];
+        for (bin, s) in &sums.0 {
+            let bin = &self.bins[*bin as usize];
             if let Some(normal) = normals.get_mut(bin.group as usize) {
-                self.expand(&s, &bin.phi, normal);
+                self.expand(s, &bin.phi, normal);
             }
         }
         normals

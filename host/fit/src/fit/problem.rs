@@ -8,6 +8,7 @@ use super::basis::{Columns, Orthonormal, columns};
 use super::design::{Bin, Design, Layout, Row};
 use super::dimensions::{Adjusted, Mounting};
 use super::nodes::Pressures;
+use super::normal_equations::NormalEquations;
 use super::points::{Point, Points};
 use super::screen::{Clip, PointUse, Screen};
 use super::smoothing::Smoothing;
@@ -119,10 +120,9 @@ impl Problem {
         self.design.origin + parameters[Layout::DEADBAND]
     }
 
-    /// The penalty on bending at these parameters.
-    pub(super) fn penalty(&self, parameters: &[f64], weights: &[f64], smoothing: Smoothing) -> Symmetric {
-        let data = self.design.normal(parameters, weights);
-        self.design.penalty(&data, smoothing.elastic, smoothing.friction)
+    /// The penalty on bending, where these are the normal equations.
+    pub(super) fn penalty(&self, data: &NormalEquations, smoothing: Smoothing) -> Symmetric {
+        self.design.penalty(data, smoothing.elastic, smoothing.friction)
     }
 
     /// The solution from a start nearby, after at most `steps` steps of Gauss and Newton.
@@ -133,8 +133,19 @@ impl Problem {
         smoothing: Smoothing,
         steps: usize,
     ) -> Vec<f64> {
-        let data = self.design.normal(start, weights);
-        let penalty = self.design.penalty(&data, smoothing.elastic, smoothing.friction);
+        self.solve_from(self.design.normal(start, weights), start, weights, smoothing, steps)
+    }
+
+    /// As [`Problem::solve`], where the normal equations at the start are known.
+    pub(super) fn solve_from(
+        &self,
+        data: NormalEquations,
+        start: &[f64],
+        weights: &[f64],
+        smoothing: Smoothing,
+        steps: usize,
+    ) -> Vec<f64> {
+        let penalty = self.penalty(&data, smoothing);
         let mut parameters = start.to_vec();
         self.design.solve_from(data, &mut parameters, weights, &penalty, steps);
         parameters

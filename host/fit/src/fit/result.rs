@@ -58,8 +58,9 @@ impl Fit {
         progress.stage("jackknife of the confidence intervals", 0);
         let table = table(&solution, muscle)?;
         let Solution { problem, screen, weights, parameters, .. } = &solution;
-        let penalty = problem.penalty(parameters, weights, solution.smoothing);
-        let uncertain = jackknife(problem, screen, weights, parameters, &penalty, solution.deadband_std);
+        let data = problem.design.normal(parameters, weights);
+        let equations = (&data, &problem.penalty(&data, solution.smoothing));
+        let uncertain = jackknife(problem, screen, weights, parameters, equations, solution.deadband_std);
         let table_root = table_root(&solution, &uncertain.root, &solution.problem.pressures.nodes);
         let residuals = table_residuals(&solution, &table)?;
         let chunks = chunks(&solution, &residuals, |_| true);

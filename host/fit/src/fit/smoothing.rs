@@ -35,14 +35,19 @@ pub(crate) struct Trial {
     pub score: f64,
 }
 
-/// Chooses the weights. `parameters` is a solution nearby. Groups without weight are passed over; with fewer than three
+/// Chooses the weights. `parameters` is a solution nearby, `groups` has the normal equations of each group there, and `points` is the
+/// number of points with a weight. Groups without weight are passed over; with fewer than three
 /// groups there is nothing to learn, and `START` is returned.
 ///
 /// The first and the last pressure are predicted by continuation, which is another matter than prediction between pressures:
 /// they count only where there are too few others.
 #[must_use]
-pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (Smoothing, Vec<Trial>) {
-    let groups = design.normal_by_group(parameters, weights);
+pub(crate) fn choose(
+    design: &Design,
+    parameters: &[f64],
+    groups: &[NormalEquations],
+    points: usize,
+) -> (Smoothing, Vec<Trial>) {
     let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();
     if used.len() < 3 {
         return (Smoothing::START, Vec::new());
@@ -54,7 +59,7 @@ pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (S
     let inner = if used.len() >= 4 { &used[1..used.len() - 1] } else { &used[..] };
     let mut trials = Vec::new();
     let mut score = |smoothing: Smoothing| {
-        let score = leave_out(design, parameters, &total, &groups, inner, smoothing);
+        let score = leave_out(design, parameters, &total, groups, inner, smoothing);
         trials.push(Trial { smoothing, score });
         score
     };
@@ -74,8 +79,7 @@ pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (S
     let friction = if design.friction {
         // Friction is a small part of a force that noise is as large as: a hundredth of the score is then much evidence. Four units of
         // χ² is what chance does, and each point is about one.
-        let points = weights.iter().filter(|w| **w > 0.0).count().max(1) as f64;
-        let alike = ALIKE.min(4.0 / points);
+        let alike = ALIKE.min(4.0 / points.max(1) as f64);
         best_of(grid(-8, 6).map(|w| (w, score(Smoothing { elastic, friction: w }))).collect(), alike)
     } else {
         Smoothing::START.friction
@@ -86,9 +90,8 @@ pub(crate) fn choose(design: &Design, parameters: &[f64], weights: &[f64]) -> (S
 /// Chooses how strongly `E_k` are held constant over pressure, where pressure moved through a range and the muscle was slack
 /// at part of it: there a curve without data would run away.
 #[must_use]
-pub(crate) fn choose_level(design: &Design, parameters: &[f64], weights: &[f64]) -> f64 {
+pub(crate) fn choose_level(design: &Design, parameters: &[f64], groups: &[NormalEquations]) -> f64 {
     let candidates = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
-    let groups = design.normal_by_group(parameters, weights);
     let used: Vec<usize> = (0..groups.len()).filter(|g| groups[*g].weight > 0.0).collect();
     if used.len() < 3 {
         return candidates[1];
@@ -105,7 +108,7 @@ pub(crate) fn choose_level(design: &Design, parameters: &[f64], weights: &[f64])
             let smoothing = [1e-3, 1e-1, 10.0].map(|elastic| Smoothing { elastic, ..Smoothing::START });
             // All groups, the ends too: continuation is what this penalty is for.
             smoothing
-                .map(|s| leave_out(&design, parameters, &total, &groups, &used, s))
+                .map(|s| leave_out(&design, parameters, &total, groups, &used, s))
                 .into_iter()
                 .fold(f64::INFINITY, f64::min)
         })
@@ -113,6 +116,11 @@ pub(crate) fn choose_level(design: &Design, parameters: &[f64], weights: &[f64])
     let least = scores.iter().copied().fold(f64::INFINITY, f64::min);
     let best = candidates.iter().zip(&scores).filter(|(_, s)| **s <= 1.05 * least).map(|(c, _)| *c);
     best.fold(candidates[0], f64::max)
+}
+
+/// The number of points that have a weight.
+pub(crate) fn weighted(weights: &[f64]) -> usize {
+    weights.iter().filter(|w| **w > 0.0).count()
 }
 
 fn leave_out(
@@ -156,7 +164,7 @@ mod tests {
         let all = design.normal(&parameters, &weights);
         let penalty = design.penalty(&all, smoothing.elastic, smoothing.friction);
         design.solve(&mut parameters, &weights, &penalty, 30);
-        let groups = design.normal_by_group(&parameters, &weights);
+        let groups = design.normal_by_group(&design.bin_sums(&parameters, &weights));
         let short = leave_out(&design, &parameters, &all, &groups, &[2], smoothing);
         let without: Vec<f64> = design.rows.iter().map(|r| f64::from(u8::from(r.bin != 2))).collect();
         let mut refit = parameters.clone();
@@ -179,7 +187,8 @@ mod tests {
             row.force += 0.5 * (i as f64 * 12.9898).sin();
         }
         let weights = vec![1.0; design.rows.len()];
-        let (chosen, trials) = choose(&design, &parameters, &weights);
+        let groups = design.normal_by_group(&design.bin_sums(&parameters, &weights));
+        let (chosen, trials) = choose(&design, &parameters, &groups, weights.len());
         assert!(chosen.elastic >= 1.0 && chosen.friction >= 1.0, "{chosen:?}");
         assert!(trials.iter().all(|t| t.score.is_finite()));
     }

@@ -166,17 +166,20 @@ fn search(problem: Problem, screen: Screen, options: &Options, progress: &dyn Pr
     if let Some(held) = held {
         (problem, parameters) = deadband::hold(problem, &weights.values, parameters, held.value);
     }
+    let sums = problem.design.bin_sums(&parameters, &weights.values);
     let smoothing = match options.smoothing {
         Some(weight) => Smoothing { elastic: weight, friction: weight },
         None => {
+            let groups = problem.design.normal_by_group(&sums);
             if !problem.pressures.held {
-                let level = smoothing::choose_level(&problem.design, &parameters, &weights.values);
+                let level = smoothing::choose_level(&problem.design, &parameters, &groups);
                 problem.design.level = level;
             }
-            smoothing::choose(&problem.design, &parameters, &weights.values).0
+            smoothing::choose(&problem.design, &parameters, &groups, smoothing::weighted(&weights.values)).0
         }
     };
-    let parameters = problem.solve(&parameters, &weights.values, smoothing, 12);
+    let data = problem.design.normal_of_groups(&sums, |_| true);
+    let parameters = problem.solve_from(data, &parameters, &weights.values, smoothing, 12);
     let slack::HeldDown { screen, weights, mut parameters } =
         slack::hold_down(&problem, &screen, weights.values, parameters, smoothing);
     if options.physical {

@@ -14,6 +14,7 @@
 use std::ops::Range;
 
 use super::design::{Design, Layout};
+use super::normal_equations::NormalEquations;
 use super::problem::Problem;
 use super::screen::Screen;
 use super::solution::Solution;
@@ -41,21 +42,24 @@ const MOST_BLOCKS: usize = 240;
 /// Lags of the autocorrelation that reports show.
 const SHOWN_LAGS: usize = 60;
 
+/// The normal equations at the parameters, and the penalty that belongs to them.
+pub(super) type Equations<'a> = (&'a NormalEquations, &'a Symmetric);
+
 /// Runs the jackknife. `deadband_std` is the standard deviation of a `P0` that is held, Pa.
 pub(super) fn jackknife(
     problem: &Problem,
     screen: &Screen,
     weights: &[f64],
     parameters: &[f64],
-    penalty: &Symmetric,
+    equations: Equations<'_>,
     deadband_std: Option<f64>,
 ) -> Uncertain {
     let residuals = Residuals::of(problem, screen, weights, parameters);
     let correlation = residuals.correlation_time();
     let blocks = blocks(problem, weights, correlation);
-    let mut root = leave_out(&problem.design, parameters, weights, penalty, &blocks);
+    let mut root = leave_out(&problem.design, parameters, weights, equations, &blocks);
     if let Some(std) = deadband_std {
-        root.append(&follow_deadband(&problem.design, weights, parameters, penalty, std));
+        root.append(&follow_deadband(&problem.design, equations, std));
     }
     let autocorrelation = (0..=SHOWN_LAGS).map(|lag| residuals.autocorrelation(lag)).collect();
     Uncertain { root, blocks: blocks.len(), correlation, autocorrelation }
@@ -67,21 +71,15 @@ pub(super) fn jackknife_root(
     screen: &Screen,
     weights: &[f64],
     parameters: &[f64],
-    penalty: &Symmetric,
+    equations: Equations<'_>,
 ) -> CovarianceRoot {
     let correlation = Residuals::of(problem, screen, weights, parameters).correlation_time();
-    leave_out(&problem.design, parameters, weights, penalty, &blocks(problem, weights, correlation))
+    leave_out(&problem.design, parameters, weights, equations, &blocks(problem, weights, correlation))
 }
 
 /// How all parameters follow when a held `P0` moves by `std`, Pa.
-fn follow_deadband(
-    design: &Design,
-    weights: &[f64],
-    parameters: &[f64],
-    penalty: &Symmetric,
-    std: f64,
-) -> Vec<f64> {
-    let mut matrix = design.normal(parameters, weights).matrix;
+fn follow_deadband(design: &Design, (data, penalty): Equations<'_>, std: f64) -> Vec<f64> {
+    let mut matrix = data.matrix.clone();
     matrix.add_scaled(penalty, 1.0);
     let mut right = vec![0.0; matrix.n];
     right[Layout::DEADBAND] = design.hold_deadband * std;
@@ -92,11 +90,11 @@ fn leave_out(
     design: &Design,
     parameters: &[f64],
     weights: &[f64],
-    penalty: &Symmetric,
+    (data, penalty): Equations<'_>,
     blocks: &[Range<usize>],
 ) -> CovarianceRoot {
     let curves = design.curves(parameters);
-    let mut whole = design.normal(parameters, weights).matrix;
+    let mut whole = data.matrix.clone();
     whole.add_scaled(penalty, 1.0);
     let mut columns: Vec<Vec<f64>> = Vec::with_capacity(blocks.len());
     for block in blocks {
