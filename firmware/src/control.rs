@@ -354,16 +354,14 @@ impl Controller {
             }
         }
         self.present = found.gravest().map(|(_, finding)| finding.fault);
+        self.disarm_when_silent();
         match (self.machine.state(), self.arming) {
             (State::Running, _) => {
                 self.ask();
                 self.drive();
             }
             (State::Disarmed, Arming::Filling(_) | Arming::Dumping(_)) => self.test_valves(),
-            _ => {
-                self.disarm_when_silent();
-                self.rest();
-            }
+            _ => self.rest(),
         }
         for side in Side::ALL {
             // Without a table there is nothing to compare, and never was.

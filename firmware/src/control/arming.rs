@@ -6,7 +6,7 @@
 //! ```
 //! The test is best made below the deadband, where the muscle does not move. The device is disarmed while it lasts.
 
-use model_core::link::messages::{Fault, Refusal, Session, Side, State};
+use model_core::link::messages::{Fault, Mode, Refusal, Session, Side, State};
 use model_core::scalar::Scalar;
 
 use super::Controller;
@@ -77,10 +77,16 @@ impl Controller {
         Ok(())
     }
 
-    /// Disarms a device whose owner has been silent: the program that armed it has ended, and no other may find it ready.
+    /// Disarms a device whose owner has been silent: the program that armed it has ended, and no other may find it ready. One that runs
+    /// in the mode that vents is as ready as an armed one.
     pub(super) fn disarm_when_silent(&mut self) {
-        if self.machine.state() == State::Armed && self.owner_age > self.settings.watch.armed_silence_ticks {
-            // Allowed from `Armed`.
+        let is_ready = match self.machine.state() {
+            State::Armed => true,
+            State::Running => self.mode == Mode::Vent,
+            State::Disarmed | State::Fault => false,
+        };
+        if is_ready && self.owner_age > self.settings.watch.armed_silence_ticks {
+            // Allowed from `Armed` and `Running`.
             let _ = self.disarm();
         }
     }

@@ -4,6 +4,7 @@ use model_core::link::messages::{Fault, Mode, Side, State};
 use model_core::link::settings::{Reaction, Settings};
 
 use super::actuator::Actuator;
+use super::arming::Arming;
 use super::{Controller, in_register};
 use crate::board::Inputs;
 use crate::safety;
@@ -39,10 +40,15 @@ fn check(actuator: &mut Actuator, settings: &Settings, report: &mut dyn FnMut(Fi
 }
 
 impl Controller {
-    /// What is a fault in the present state. A muscle that the running mode does not use is watched as if disarmed.
+    /// What is a fault in the present state. A muscle that the running mode does not use is watched as if disarmed. While valves are tested
+    /// the device is watched as if armed: it is disarmed, but its muscles are under pressure.
     pub(super) fn watch(&mut self, inputs: &Inputs) -> Found {
         let mut found = Found::default();
-        let (state, hold_on) = (self.machine.state(), self.settings.hold_on);
+        let hold_on = self.settings.hold_on;
+        let state = match self.machine.state() {
+            State::Disarmed if self.arming != Arming::Idle => State::Armed,
+            state => state,
+        };
         let mut note = |side, state, finding: Finding| {
             if !safety::is_watched(finding.fault, state) {
                 return;

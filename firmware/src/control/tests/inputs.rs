@@ -171,3 +171,23 @@ fn signals_are_read_as_means_before_any_scale() {
     assert_eq!((answer.ticks, answer.mean.force, answer.mean.second_pressure), (50, 0.25, Some(0.5)));
     assert_eq!((answer.supply, answer.enabled), (Some(1.5), true));
 }
+
+#[test]
+fn an_open_enable_input_ends_the_test_of_the_valves_within_three_ticks() {
+    let mut bench = Bench::new(|settings| {
+        settings.watch.enable_input = true;
+        settings.watch.valve_test_pa = 40e3;
+    });
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    bench.pass(20);
+    assert!(bench.pressure_pa > 10e3 && !bench.is_vented(), "the muscle is being filled");
+    bench.pass_with(3, |_, inputs| inputs.enable_open = true);
+    assert_eq!((bench.controller.state(), bench.latched()), (State::Fault, Some(Fault::EnableOpen)));
+    assert!(bench.is_vented());
+    bench.pass(1_000);
+    assert_eq!(bench.controller.clear(), Ok(()));
+    bench.pass(1_000);
+    assert_eq!(bench.controller.state(), State::Disarmed, "the test does not continue without a request");
+    assert!(bench.is_vented());
+}

@@ -91,3 +91,17 @@ fn an_armed_device_disarms_itself_in_the_tick_after_its_time() {
     bench.pass(1);
     assert_eq!(bench.controller.state(), State::Disarmed);
 }
+
+#[test]
+fn a_device_that_runs_in_the_mode_that_vents_disarms_itself_like_an_armed_one() {
+    let mut bench = Bench::new(|settings| settings.watch.armed_silence_ticks = 50);
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    assert_eq!(bench.controller.start(Mode::Vent, OWNER), Ok(()));
+    bench.pass(500);
+    assert_eq!(bench.controller.state(), State::Running, "its owner keeps it alive");
+    bench.hears_host = false;
+    bench.pass(51);
+    assert_eq!(bench.controller.state(), State::Disarmed);
+    assert_eq!(bench.latched(), None);
+}
