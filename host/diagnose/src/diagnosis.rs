@@ -3,16 +3,16 @@
 use model_core::braid::{Braid, Geometry};
 use model_core::effects::Imitates;
 
-use super::baselines::{self, Kind};
+use super::baselines::{self, Kind, PushedRows};
 use super::bench_checks::BenchChecks;
 use super::candidates::{Candidate, library};
 use super::confirmation::select_and_confirm;
-use super::criteria::baseline::TABLE_ORDER;
+use super::criteria::baseline::{TABLE_ORDER, WALL};
 use super::criteria::judgement::{
     EXPLAINED, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED,
     PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
 };
-use super::criteria::rows::{SLACK_MENTIONED, SLACK_ROUNDS};
+use super::criteria::rows::{NO_LOAD, SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
 use super::findings::{considered, missing};
 use super::known_effects;
@@ -23,7 +23,7 @@ use super::options::Options;
 use super::preconditions::{blocked_force, limitations, not_judged, unmet_precondition};
 use super::remark::{Remark, Unjudgeable};
 use super::rest_friction;
-use super::rows::{self, Rows};
+use super::rows::{self, Rows, SingleBladder};
 use super::selection_step::Selection;
 use super::spectrum::{self, Line};
 use super::table_evidence::{absorbed_by_tables, patterns_over_pressure};
@@ -63,12 +63,15 @@ fn ask(
     let rows = rows.watched(options.progress.clone());
     let (blocked, step) = (blocked_force(&rows), rows::typical_step(&rows));
     remarks.extend(limitations(&rows));
-    let screened = screen(&rows, blocked, &mut remarks);
-    let settled = screened.and_then(|screened| settle(&screened, &mut remarks));
-    let Settled { rows, misfit } = match settled {
+    let settled = match settle_at_a_wall(&rows, blocked) {
+        Some(at_a_wall) => Ok(at_a_wall),
+        None => settle(&rows, blocked, PushedRows::Excluded),
+    };
+    let Settled { rows, misfit, remarks: found } = match settled {
         Ok(settled) => settled,
         Err(reason) => return Ok((not_judged(&rows, options, remarks, reason, blocked), Kind::Stiff)),
     };
+    remarks.extend(found);
     let selected = select(&rows, options, known, (blocked, step), &mut remarks);
     let excess = Excess::of(&selected, blocked, step, &mut remarks);
     let located = Located::of(&selected, &excess, blocked, step);
@@ -78,8 +81,8 @@ fn ask(
     Ok((answer(options, measures, selected, located, verdict, remarks), kind))
 }
 
-/// The rows without those at which the muscle is slack; or why nothing can be judged.
-fn screen(rows: &Rows, blocked: f64, remarks: &mut Vec<Remark>) -> Result<Rows, Unjudgeable> {
+/// The rows without those at which the muscle is slack, and a remark on these; or why nothing can be judged.
+fn screen(rows: &Rows, blocked: f64, pushed: PushedRows) -> Result<(Rows, Option<Remark>), Unjudgeable> {
     if let Some(reason) = unmet_precondition(rows, blocked) {
         return Err(reason);
     }
@@ -88,25 +91,27 @@ fn screen(rows: &Rows, blocked: f64, remarks: &mut Vec<Remark>) -> Result<Rows, 
     for _ in 0..SLACK_ROUNDS {
         // Twice: the first fit still saw the slack rows.
         let fitted = baselines::fit(&screened, Kind::Stiff, &[]);
-        let (without, masked) = baselines::without_slack(&screened, &fitted);
+        let (without, masked) = baselines::without_load(&screened, &fitted, pushed);
         screened = without;
         slack += masked;
     }
-    if slack * SLACK_MENTIONED > rows.len() {
-        remarks.push(Remark::Slack(slack as f64 / rows.len() as f64));
-    }
-    unmet_precondition(&screened, blocked).map_or(Ok(screened), Err)
+    let mentioned = slack * SLACK_MENTIONED > rows.len();
+    let remark = mentioned.then(|| Remark::Slack(slack as f64 / rows.len() as f64));
+    unmet_precondition(&screened, blocked).map_or(Ok((screened, remark)), Err)
 }
 
-/// Rows whose friction at rest is known, and the error of the model as it was, N.
+/// Rows whose friction at rest is known, the error of the model as it was, N, and remarks on the way.
 struct Settled {
     rows: Rows,
     misfit: f64,
+    remarks: Vec<Remark>,
 }
 
-/// Settles what friction does at rest, and fits the model as it was, or returns why nothing can be judged.
-fn settle(rows: &Rows, remarks: &mut Vec<Remark>) -> Result<Settled, Unjudgeable> {
-    let (rows, law) = rest_friction::settle_rest_friction(rows);
+/// Excludes slack rows, settles what friction does at rest, and fits the model as it was, or returns why nothing can be judged.
+fn settle(rows: &Rows, blocked: f64, pushed: PushedRows) -> Result<Settled, Unjudgeable> {
+    let (screened, slack) = screen(rows, blocked, pushed)?;
+    let (rows, law) = rest_friction::settle_rest_friction(&screened);
+    let mut remarks: Vec<Remark> = slack.into_iter().collect();
     remarks.extend(law.map(|law| Remark::FrictionAtRest(law.into())));
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]);
@@ -116,7 +121,23 @@ fn settle(rows: &Rows, remarks: &mut Vec<Remark>) -> Result<Settled, Unjudgeable
         return Err(Unjudgeable::WrongModel { misfit, measured });
     }
     remarks.extend(patterns_over_pressure(&production, &rows));
-    Ok(Settled { rows, misfit })
+    Ok(Settled { rows, misfit, remarks })
+}
+
+/// The rows with those at which the rig pushes the muscle, where these show a wall near full contraction: a force over the stroke alone,
+/// which one bladder of many orders follows and the tables, which have few, do not. What the tables leave there is not noise, and a bladder
+/// of many orders must not hide it.
+fn settle_at_a_wall(rows: &Rows, blocked: f64) -> Option<Settled> {
+    if rows.isometric || !rows.force.iter().any(|f| *f < -NO_LOAD * blocked) {
+        return None;
+    }
+    let Settled { rows, misfit, mut remarks } = settle(rows, blocked, PushedRows::Count).ok()?;
+    let stiffening = baselines::fit(&rows, Kind::Stiff, &[]).rms(&rows);
+    if misfit * misfit - stiffening * stiffening <= (WALL * blocked).powi(2) {
+        return None;
+    }
+    remarks.push(Remark::Wall);
+    Some(Settled { rows: rows.with_single_bladder(SingleBladder::AsTable), misfit, remarks })
 }
 
 /// The effects that were selected, out of which library, and how they do on held-out rows.

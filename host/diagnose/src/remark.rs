@@ -104,6 +104,8 @@ pub enum Remark {
     OneDirection,
     /// No vented rows.
     NoVentedRows,
+    /// Near full contraction the force falls more steeply than the table's elastic orders can follow.
+    Wall,
     /// This share of the rows is slack and excluded.
     Slack(f64),
     /// Friction while the length is held.

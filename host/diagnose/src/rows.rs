@@ -80,6 +80,16 @@ pub(crate) struct RestFriction {
     pub rest: Vec<u32>,
 }
 
+/// What one bladder for all pressures may do near full contraction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum SingleBladder {
+    /// It stiffens as a hyperelastic wall does: six orders, and a Yeoh wall.
+    #[default]
+    Stiffens,
+    /// It has the orders of the table, so that a contraction stop is left to an effect.
+    AsTable,
+}
+
 /// The rows of a campaign: what was recorded, a mask, and the model about which effects are linearised.
 ///
 /// A value of it never changes. What masks rows or moves the linearisation gives another value, which shares what stays.
@@ -91,6 +101,7 @@ pub(crate) struct Rows {
     /// Square root of each row's weight; zero where the direction is in doubt or the muscle is slack.
     root_weight: Arc<Vec<f64>>,
     rest_friction: Arc<RestFriction>,
+    single_bladder: SingleBladder,
     progress: SharedProgress,
 }
 
@@ -118,6 +129,10 @@ impl Rows {
     /// What friction does at rest.
     pub(crate) fn at_rest(&self) -> &RestFriction {
         &self.rest_friction
+    }
+    /// What one bladder for all pressures may do near full contraction.
+    pub(crate) fn single_bladder(&self) -> SingleBladder {
+        self.single_bladder
     }
     /// Receives the progress of the work on them.
     pub(crate) fn progress(&self) -> &SharedProgress {
@@ -149,6 +164,10 @@ impl Rows {
     /// The same rows, with what friction does at rest.
     pub(crate) fn with_rest_friction(&self, rest_friction: RestFriction) -> Self {
         Self { rest_friction: Arc::new(rest_friction), ..self.clone() }
+    }
+    /// The same rows, with another single bladder.
+    pub(crate) fn with_single_bladder(&self, single_bladder: SingleBladder) -> Self {
+        Self { single_bladder, ..self.clone() }
     }
     /// The same rows, of which some no longer count.
     pub(crate) fn without(&self, masked: impl Fn(usize) -> bool) -> Self {
@@ -196,6 +215,7 @@ impl Rows {
             contexts: Arc::new(pick(stride, &self.contexts)),
             root_weight: Arc::new(pick(stride, &self.root_weight)),
             rest_friction: Arc::new(rest_friction),
+            single_bladder: self.single_bladder,
             progress: self.progress.clone(),
         }
     }
@@ -261,6 +281,7 @@ pub(crate) fn prepare_corrected(
         contexts: Arc::new(gathered.contexts),
         root_weight: Arc::new(root_weight),
         rest_friction: Arc::new(stays),
+        single_bladder: SingleBladder::default(),
         progress: SharedProgress::default(),
     };
     Ok((rows, remarks))

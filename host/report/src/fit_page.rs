@@ -186,6 +186,7 @@ fn remarks(view: &View<'_>) -> Section {
         (rows.near_turn, "just after a reversal, where friction has not yet reversed"),
         (rows.unknown_direction, "direction of motion unknown"),
         (rows.slack, "muscle slack"),
+        (rows.pushed, "muscle pushed by the rig"),
         (rows.clipped, "force sensor at the end of its range"),
         (rows.outliers, "outliers"),
         (rows.dropouts, "pressure gauge dropped out"),

@@ -80,6 +80,9 @@ struct Rows {
     outliers: usize,
     /// Absent where there is none.
     #[serde(default)]
+    pushed: usize,
+    /// Absent where there is none.
+    #[serde(default)]
     dropouts: usize,
 }
 

@@ -330,3 +330,34 @@ fn a_prediction_of_a_recording_with_decimal_commas_can_be_read_again() {
     let columns = written.lines().map(|l| l.split(',').count()).collect::<std::collections::HashSet<_>>();
     assert_eq!(columns.into_iter().collect::<Vec<_>>(), [5], "{written}");
 }
+
+/// The rig pushes the muscle against its contraction stop. Polynomials that followed the wall would be wrong where the muscle pulls; and
+/// the wall is no noise, so that a diagnosis names it.
+#[test]
+fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_leaves_the_table_as_it_was() {
+    let mut noise = Noise::new(8, 0.0);
+    let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise)));
+    for r in &mut recordings {
+        for (force, stroke) in r.force.iter_mut().flatten().zip(&r.stroke) {
+            *force -= 2e9 * (stroke - 2.3e-3).max(0.0).powi(2);
+        }
+    }
+    let campaign = Campaign::new(recordings.to_vec());
+    let found = fit(&campaign, &description(), &Options::default()).unwrap();
+    // Between the stop and zero force the muscle pulls less than its polynomials can follow; elsewhere they are as good as ever.
+    let highest = found.summary.pressures.last().unwrap();
+    let blocked = force(SIX[5], 0.0, 0.0);
+    let off = (highest.blocked_force_N - blocked).abs() / blocked;
+    assert!(off < 0.02, "blocked force off by {off}");
+    assert!((highest.k_F - friction(SIX[5])).abs() < 0.005, "k_F {}", highest.k_F);
+    // 3.3 % where the polynomials follow the wall.
+    assert!(found.summary.mean_error_pct < 2.8, "{} %", found.summary.mean_error_pct);
+    let pushed = found.summary.warnings.iter().find(|w| w.contains("the rig pushes the muscle"));
+    assert!(pushed.is_some(), "{:?}", found.summary.warnings);
+
+    let answer = diagnose(&campaign, &description().geometry(), &pam_diagnose::Options::default()).unwrap();
+    let names: Vec<&str> = answer.missing.iter().map(|m| m.effect.as_str()).collect();
+    assert_eq!(names, ["strand-jamming"], "{:?}", words(&answer));
+    let from = answer.missing[0].parameters.iter().find(|p| p.name == "jamming_contraction").unwrap().value;
+    assert!((from - 2.3e-3 / REST).abs() < 0.003, "the strands jam at a contraction of {from}");
+}

@@ -4,7 +4,7 @@ use model_core::spline;
 
 use super::Kind;
 use crate::criteria::baseline::{FRICTION_POWERS, FRICTION_RANGE, TABLE_ORDER};
-use crate::rows::{ORDERS, Rows, YEOH};
+use crate::rows::{ORDERS, Rows, SingleBladder, YEOH};
 
 /// The cardinal functions of the natural spline on the levels, at pressure `p` (held at the ends).
 fn cardinal(levels: &[f64], cubics: &[[spline::Cubic<f64>; spline::MAX_PIECES]], p: f64, out: &mut [f64]) {
@@ -121,8 +121,13 @@ impl Plan {
             for degree in 0..rows.levels.len().clamp(1, FRICTION_POWERS) {
                 functions.push(rows.contexts().iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
             }
-            hard.extend((0..ORDERS).map(|k| Part::Elastic(k, 0)));
-            hard.extend((0..YEOH).map(Part::Yeoh));
+            match rows.single_bladder() {
+                SingleBladder::Stiffens => {
+                    hard.extend((0..ORDERS).map(|k| Part::Elastic(k, 0)));
+                    hard.extend((0..YEOH).map(Part::Yeoh));
+                }
+                SingleBladder::AsTable => hard.extend((0..TABLE_ORDER).map(|k| Part::Elastic(k, 0))),
+            }
             hard.extend((0..functions.len()).map(Part::Friction));
             if matches!(kind, Kind::Soft(_)) && rows.levels.len() > 1 {
                 let over = cardinals(&mut functions);

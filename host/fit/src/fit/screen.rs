@@ -15,6 +15,8 @@ pub enum PointUse {
     NearReversal,
     /// Excluded: the muscle is slack; the force stays at zero where the model would push.
     Slack,
+    /// Excluded: the rig pushes the muscle; the table describes its pull.
+    Pushed,
     /// Excluded: the force reading is at the end of the sensor's range.
     Clipped,
     /// Excluded: the reading is far outside the scatter of the others.

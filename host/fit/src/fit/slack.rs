@@ -1,4 +1,4 @@
-//! Where the muscle is slack: its force stays at zero, and the model must not pull there.
+//! Where the muscle is slack or pushed: its force stays at zero or below, and the model must not pull there.
 
 use super::problem::Problem;
 use super::screen::{PointUse, Screen};
@@ -6,7 +6,8 @@ use super::smoothing::Smoothing;
 use super::weights::Weights;
 
 /// Finds where the muscle is slack: the force is near zero where straight curves, fitted to the points that pull, would push.
-/// Flexible curves would bend until they described slackness as elasticity.
+/// Flexible curves would bend until they described slackness as elasticity. Where the rig pushes the muscle against its contraction stop
+/// the force is well below zero: polynomials that followed it would be wrong where the muscle pulls.
 ///
 /// Returns the screen and the parameters of the straight curves; where too few points have a force near zero, both as they were.
 pub(super) fn find(problem: &Problem, screen: &Screen, parameters: Vec<f64>) -> (Screen, Vec<f64>) {
@@ -30,20 +31,26 @@ pub(super) fn find(problem: &Problem, screen: &Screen, parameters: Vec<f64>) -> 
     straight.design.level = 10.0;
     let parameters = straight.solve(&parameters, &weights.values, Smoothing::STRAIGHT, 10);
     let curves = problem.design.curves(&parameters);
+    let below_zero = floor - 0.03 * force;
     let mut used = screen.used.clone();
-    let mut slack = 0.0;
-    for i in 0..used.len() {
+    let mut without_pull = 0.0;
+    for i in (0..used.len()).filter(|i| candidates[*i]) {
         let e = problem.design.evaluate(i, &parameters, &curves);
-        if candidates[i] && e.force < floor - 0.03 * force {
-            if !matches!(used[i], PointUse::Clipped | PointUse::Dropout) {
-                used[i] = PointUse::Slack;
-            }
-            slack += f64::from(points.list[i].rows);
+        let state = if points.list[i].force < below_zero && e.force < near_zero {
+            PointUse::Pushed
+        } else if e.force < below_zero {
+            PointUse::Slack
+        } else {
+            continue;
+        };
+        if !matches!(used[i], PointUse::Clipped | PointUse::Dropout) {
+            used[i] = state;
         }
+        without_pull += f64::from(points.list[i].rows);
     }
-    let goes_slack = slack > 0.005 * points.rows as f64;
+    let goes_slack = without_pull > 0.005 * points.rows as f64;
     if !goes_slack {
-        for u in used.iter_mut().filter(|u| **u == PointUse::Slack) {
+        for u in used.iter_mut().filter(|u| matches!(u, PointUse::Slack | PointUse::Pushed)) {
             *u = PointUse::Fitted;
         }
     }

@@ -125,6 +125,9 @@ pub struct RowUse {
     pub unknown_direction: usize,
     /// Rows where the muscle is slack.
     pub slack: usize,
+    /// Rows where the rig pushes the muscle; absent where it does not.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub pushed: usize,
     /// Rows with the force sensor at the end of its range.
     pub clipped: usize,
     /// Rows whose force is outside the scatter of the others.
@@ -345,6 +348,7 @@ fn row_use(solution: &Solution) -> RowUse {
             PointUse::NearReversal => &mut rows.near_turn,
             PointUse::UnknownDirection => &mut rows.unknown_direction,
             PointUse::Slack => &mut rows.slack,
+            PointUse::Pushed => &mut rows.pushed,
             PointUse::Clipped => &mut rows.clipped,
             PointUse::Outlier => &mut rows.outliers,
             PointUse::Dropout => &mut rows.dropouts,

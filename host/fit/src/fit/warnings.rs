@@ -208,6 +208,14 @@ fn excluded(solution: &Solution, out: &mut Vec<String>) {
             pluralise(slack, "row")
         ));
     }
+    let pushed = rows(solution, PointUse::Pushed);
+    if pushed > 0 {
+        out.push(format!(
+            "excluded: {} where the rig pushes the muscle (force below zero by more than 3 %): the table describes its pull. Stop the stroke \
+             at zero force, or let `host diagnose` look for a contraction stop (strand-jamming)",
+            pluralise(pushed, "row")
+        ));
+    }
     if !solution.screen.outliers.is_empty() {
         out.push(format!(
             "excluded: {} of the force outside the scatter of the others, listed under `outliers`",
