@@ -52,6 +52,13 @@ struct Seal {
 
 fields!(Seal { current, previous });
 
+impl Seal {
+    /// Whether settings of this sum are to be expected.
+    fn names(&self, sum: u32) -> bool {
+        sum == self.current || Some(sum) == self.previous
+    }
+}
+
 /// Sum of what lies under a key; nothing has none.
 fn sum_of(bytes: Option<&[u8]>) -> u32 {
     bytes.map_or(0, |bytes| crc32(bytes).max(1))
@@ -151,10 +158,7 @@ impl<F: NorFlash> Store<F> {
         let layout = self.value::<u16>(LAYOUT)?;
         let seal = self.value::<Seal>(SEAL)?;
         let own = *settings;
-        let sealed = |bytes: Option<&[u8]>| {
-            let sum = sum_of(bytes);
-            seal.is_some_and(|seal| sum == seal.current || Some(sum) == seal.previous)
-        };
+        let sealed = |bytes: Option<&[u8]>| seal.is_some_and(|seal| seal.names(sum_of(bytes)));
         if let Some(bytes) = self.bytes(SETTINGS)? {
             if sealed(Some(bytes))
                 && layout.is_none_or(|layout| layout <= FORMAT)
@@ -217,7 +221,9 @@ impl<F: NorFlash> Store<F> {
             }
         }
         let current = sum_of(Some(bytes));
-        self.put_value(SEAL, &mut Seal { current, previous: Some(before) })?;
+        // Where the newest settings were damaged, what is read is those before them: after a power cut, no more to be trusted than now.
+        let trusted = self.value::<Seal>(SEAL)?.is_none_or(|seal| seal.names(before));
+        self.put_value(SEAL, &mut Seal { current, previous: trusted.then_some(before) })?;
         self.put_bytes(SETTINGS, bytes)?;
         self.put_value(SEAL, &mut Seal { current, previous: None })?;
         if self.value::<u16>(LAYOUT)? != Some(FORMAT) {

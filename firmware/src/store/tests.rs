@@ -124,6 +124,36 @@ fn settings_that_lose_power_are_the_old_or_the_new() {
     );
 }
 
+/// The newest settings are damaged and new ones are confirmed: those of before the damaged ones never come into force unseen.
+#[test]
+fn settings_confirmed_after_damage_that_lose_power_are_new_or_not_trusted() {
+    let mut store = used(1);
+    let mut newer = Settings::default();
+    newer.limits.pressure_pa = 250e3;
+    store.put_settings(&mut { newer }).expect("room");
+    let mut damaged = store.close();
+    let mut bytes = [0; 400];
+    let length = model_core::fields::write(&mut newer, &mut bytes).expect("room");
+    let place = damaged.bytes.windows(length).position(|w| w == &bytes[..length]).expect("they are there");
+    damaged.bytes[place] ^= 1;
+    assert_eq!(open(damaged.clone()).settings(&mut Settings::default()), Ok(Kept::Untrusted));
+    let mut confirmed = newer;
+    confirmed.limits.pressure_pa = 240e3;
+    let cuts = cut_everywhere(
+        &damaged,
+        |store| store.put_settings(&mut { confirmed }).is_ok(),
+        |store, left| {
+            let mut read = Settings::default();
+            match store.settings(&mut read) {
+                Ok(Kept::Untrusted) => {}
+                Ok(Kept::Whole) => assert_eq!(read, confirmed, "after {left} words"),
+                other => panic!("{other:?} after {left} words"),
+            }
+        },
+    );
+    assert!(cuts > 50, "{cuts} cuts tried");
+}
+
 #[test]
 fn rolling_back_returns_and_there_and_back_again() {
     let mut store = open(MockFlash::erased());
