@@ -10,6 +10,7 @@
 
 mod absorbable;
 mod plan;
+mod slack;
 
 use std::ops::Range;
 
@@ -18,10 +19,10 @@ use rayon::prelude::*;
 
 pub(crate) use self::absorbable::{Absorbable, PriorDeviations, cosine, keeps, projected, shrink};
 use self::plan::{Part, Plan};
+pub(crate) use self::slack::{PushedRows, without_load, without_slack};
 use super::criteria::baseline::{
     CACHED_ROWS, DISTINCT_DIRECTION, FRICTION_LIMITS, LINEARISATIONS, PRODUCT_PART,
 };
-use super::criteria::rows::{NO_LOAD, SLACK_MODEL};
 use super::linear::{Basis, energy, weighted};
 use super::rows::{ORDERS, Rows};
 
@@ -374,32 +375,6 @@ fn values_within(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64], withi
         v.force[i] = live[row] * v.quasi[i] * (1.0 - v.friction[i] * direction - late);
     }
     v
-}
-
-/// Rows at which the rig pushes the muscle: the force is well below zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum PushedRows {
-    /// They say as little as those of a slack muscle: what presses on it need not be the muscle.
-    Excluded,
-    /// They count: a contraction stop is seen there.
-    Count,
-}
-
-/// The rows without those at which the muscle hangs slack (no force although the pressure would give some), and how many these are. A
-/// slack muscle's force is its floor, not the model's.
-pub(crate) fn without_slack(rows: &Rows, fitted: &Baseline) -> (Rows, usize) {
-    without_load(rows, fitted, PushedRows::Excluded)
-}
-
-/// The same, where rows at which the rig pushes the muscle may count.
-pub(crate) fn without_load(rows: &Rows, fitted: &Baseline, pushed: PushedRows) -> (Rows, usize) {
-    let strongest = rows.force.iter().copied().fold(0.0, f64::max);
-    let slack = |i: usize| {
-        let force = if pushed == PushedRows::Count { rows.force[i].abs() } else { rows.force[i] };
-        let slack = fitted.quasi[i] < SLACK_MODEL * strongest && force < NO_LOAD * strongest;
-        slack && !rows.vented[i] && rows.root_weight()[i] > 0.0
-    };
-    (rows.without(slack), (0..rows.len()).filter(|i| slack(*i)).count())
 }
 
 /// The rows linearised about a baseline: their contexts then hold its forces and slopes, which effects use.
