@@ -63,15 +63,14 @@ fn ask(
     let rows = rows.watched(options.progress.clone());
     let (blocked, step) = (blocked_force(&rows), rows::typical_step(&rows));
     remarks.extend(limitations(&rows));
-    let settled = match settle_at_a_wall(&rows, blocked) {
+    let settled = match settle_at_a_wall(&rows, blocked, &mut remarks) {
         Some(at_a_wall) => Ok(at_a_wall),
-        None => settle(&rows, blocked, PushedRows::Excluded),
+        None => settle(&rows, blocked, PushedRows::Excluded, &mut remarks),
     };
-    let Settled { rows, misfit, remarks: found } = match settled {
+    let Settled { rows, misfit } = match settled {
         Ok(settled) => settled,
         Err(reason) => return Ok((not_judged(&rows, options, remarks, reason, blocked), Kind::Stiff)),
     };
-    remarks.extend(found);
     let selected = select(&rows, options, known, (blocked, step), &mut remarks);
     let excess = Excess::of(&selected, blocked, step, &mut remarks);
     let located = Located::of(&selected, &excess, blocked, step);
@@ -81,8 +80,13 @@ fn ask(
     Ok((answer(options, measures, selected, located, verdict, remarks), kind))
 }
 
-/// The rows without those at which the muscle is slack, and a remark on these; or why nothing can be judged.
-fn screen(rows: &Rows, blocked: f64, pushed: PushedRows) -> Result<(Rows, Option<Remark>), Unjudgeable> {
+/// The rows without those at which the muscle is slack; or why nothing can be judged.
+fn screen(
+    rows: &Rows,
+    blocked: f64,
+    pushed: PushedRows,
+    remarks: &mut Vec<Remark>,
+) -> Result<Rows, Unjudgeable> {
     if let Some(reason) = unmet_precondition(rows, blocked) {
         return Err(reason);
     }
@@ -95,23 +99,27 @@ fn screen(rows: &Rows, blocked: f64, pushed: PushedRows) -> Result<(Rows, Option
         screened = without;
         slack += masked;
     }
-    let mentioned = slack * SLACK_MENTIONED > rows.len();
-    let remark = mentioned.then(|| Remark::Slack(slack as f64 / rows.len() as f64));
-    unmet_precondition(&screened, blocked).map_or(Ok((screened, remark)), Err)
+    if slack * SLACK_MENTIONED > rows.len() {
+        remarks.push(Remark::Slack(slack as f64 / rows.len() as f64));
+    }
+    unmet_precondition(&screened, blocked).map_or(Ok(screened), Err)
 }
 
-/// Rows whose friction at rest is known, the error of the model as it was, N, and remarks on the way.
+/// Rows whose friction at rest is known, and the error of the model as it was, N.
 struct Settled {
     rows: Rows,
     misfit: f64,
-    remarks: Vec<Remark>,
 }
 
 /// Excludes slack rows, settles what friction does at rest, and fits the model as it was, or returns why nothing can be judged.
-fn settle(rows: &Rows, blocked: f64, pushed: PushedRows) -> Result<Settled, Unjudgeable> {
-    let (screened, slack) = screen(rows, blocked, pushed)?;
+fn settle(
+    rows: &Rows,
+    blocked: f64,
+    pushed: PushedRows,
+    remarks: &mut Vec<Remark>,
+) -> Result<Settled, Unjudgeable> {
+    let screened = screen(rows, blocked, pushed, remarks)?;
     let (rows, law) = rest_friction::settle_rest_friction(&screened);
-    let mut remarks: Vec<Remark> = slack.into_iter().collect();
     remarks.extend(law.map(|law| Remark::FrictionAtRest(law.into())));
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]);
@@ -121,23 +129,25 @@ fn settle(rows: &Rows, blocked: f64, pushed: PushedRows) -> Result<Settled, Unju
         return Err(Unjudgeable::WrongModel { misfit, measured });
     }
     remarks.extend(patterns_over_pressure(&production, &rows));
-    Ok(Settled { rows, misfit, remarks })
+    Ok(Settled { rows, misfit })
 }
 
 /// The rows with those at which the rig pushes the muscle, where these show a wall near full contraction: a force over the stroke alone,
 /// which one bladder of many orders follows and the tables, which have few, do not. What the tables leave there is not noise, and a bladder
 /// of many orders must not hide it.
-fn settle_at_a_wall(rows: &Rows, blocked: f64) -> Option<Settled> {
+fn settle_at_a_wall(rows: &Rows, blocked: f64, remarks: &mut Vec<Remark>) -> Option<Settled> {
     if rows.isometric || !rows.force.iter().any(|f| *f < -NO_LOAD * blocked) {
         return None;
     }
-    let Settled { rows, misfit, mut remarks } = settle(rows, blocked, PushedRows::Count).ok()?;
+    let mut found = Vec::new();
+    let Settled { rows, misfit } = settle(rows, blocked, PushedRows::Count, &mut found).ok()?;
     let stiffening = baselines::fit(&rows, Kind::Stiff, &[]).rms(&rows);
     if misfit * misfit - stiffening * stiffening <= (WALL * blocked).powi(2) {
         return None;
     }
+    remarks.append(&mut found);
     remarks.push(Remark::Wall);
-    Some(Settled { rows: rows.with_single_bladder(SingleBladder::AsTable), misfit, remarks })
+    Some(Settled { rows: rows.with_single_bladder(SingleBladder::AsTable), misfit })
 }
 
 /// The effects that were selected, out of which library, and how they do on held-out rows.
