@@ -4,7 +4,7 @@ use model_core::link::messages::{Mode, SideSample, State};
 use model_core::link::settings::Settings;
 
 use super::mock_flash::MockFlash;
-use super::tests::{cut_everywhere, kept, open, settings_of, table};
+use super::tests::{cut_everywhere, kept, open, place_of, settings_of, table};
 use super::*;
 
 /// What [`written`] keeps.
@@ -174,12 +174,10 @@ fn settings_of_which_a_bit_is_wrong_are_not_trusted() {
         store.put_settings(&mut { settings }).expect("room");
     }
     let flash = store.close();
-    let mut bytes = [0; 400];
-    let length = fields::write(&mut newer, &mut bytes).expect("room");
-    let place = flash.bytes.windows(length).position(|w| w == &bytes[..length]).expect("they are there");
-    for bit in 0..8 * length {
+    let place = place_of(&flash, &mut newer);
+    for bit in 0..8 * place.len() {
         let mut damaged = flash.clone().powered(usize::MAX, 0);
-        damaged.bytes[place + bit / 8] ^= 1 << (bit % 8);
+        damaged.bytes[place.start + bit / 8] ^= 1 << (bit % 8);
         let mut settings = Settings::default();
         assert_eq!(open(damaged).settings(&mut settings), Ok(Kept::Untrusted), "bit {bit}");
         assert_eq!(settings, Settings::default());

@@ -124,6 +124,14 @@ fn settings_that_lose_power_are_the_old_or_the_new() {
     );
 }
 
+/// Where settings lie on the flash.
+pub(super) fn place_of(flash: &MockFlash, settings: &mut Settings) -> core::ops::Range<usize> {
+    let mut bytes = [0; 400];
+    let length = model_core::fields::write(settings, &mut bytes).expect("room");
+    let place = flash.bytes.windows(length).position(|w| w == &bytes[..length]).expect("they are there");
+    place..place + length
+}
+
 /// The newest settings are damaged and new ones are confirmed: those of before the damaged ones never come into force unseen.
 #[test]
 fn settings_confirmed_after_damage_that_lose_power_are_new_or_not_trusted() {
@@ -132,9 +140,7 @@ fn settings_confirmed_after_damage_that_lose_power_are_new_or_not_trusted() {
     newer.limits.pressure_pa = 250e3;
     store.put_settings(&mut { newer }).expect("room");
     let mut damaged = store.close();
-    let mut bytes = [0; 400];
-    let length = model_core::fields::write(&mut newer, &mut bytes).expect("room");
-    let place = damaged.bytes.windows(length).position(|w| w == &bytes[..length]).expect("they are there");
+    let place = place_of(&damaged, &mut newer).start;
     damaged.bytes[place] ^= 1;
     assert_eq!(open(damaged.clone()).settings(&mut Settings::default()), Ok(Kept::Untrusted));
     let mut confirmed = newer;

@@ -334,7 +334,7 @@ fn a_prediction_of_a_recording_with_decimal_commas_can_be_read_again() {
 /// The rig pushes the muscle against its contraction stop. Polynomials that followed the wall would be wrong where the muscle pulls; and
 /// the wall is no noise, so that a diagnosis names it.
 #[test]
-fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_leaves_the_table_as_it_was() {
+fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_does_not_bend_the_table() {
     let mut noise = Noise::new(8, 0.0);
     let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise)));
     for r in &mut recordings {
@@ -360,4 +360,20 @@ fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_leaves_the_table_
     assert_eq!(names, ["strand-jamming"], "{:?}", words(&answer));
     let from = answer.missing[0].parameters.iter().find(|p| p.name == "jamming_contraction").unwrap().value;
     assert!((from - 2.3e-3 / REST).abs() < 0.003, "the strands jam at a contraction of {from}");
+}
+
+/// A muscle that hangs slack nearly everywhere leaves too few rows for an answer, and the answer states the reason.
+#[test]
+fn where_slack_rows_leave_too_few_to_judge_the_remarks_say_so() {
+    let mut noise = Noise::new(9, 0.0);
+    let mut recordings = SIX.map(|p| strokes(p, 40, 8.0, 0.0, 0, (0.05, &mut noise)));
+    for r in &mut recordings {
+        for (force, stroke) in r.force.iter_mut().flatten().zip(&r.stroke) {
+            *force *= f64::from(u8::from(*stroke < 0.4e-3));
+        }
+    }
+    let campaign = Campaign::new(recordings.to_vec());
+    let answer = diagnose(&campaign, &description().geometry(), &pam_diagnose::Options::default()).unwrap();
+    assert!(!answer.judged(), "{:?}", words(&answer));
+    assert!(words(&answer).iter().any(|w| w.ends_with("muscle slack")), "{:?}", words(&answer));
 }

@@ -50,7 +50,7 @@ pub(super) fn predict_left_out(
             } else {
                 let mut others = by_group.clone();
                 others[g] = NormalEquations::zeros(design.layout().len());
-                smoothing::choose(design, &parameters, &others, smoothing::weighted(&weights)).0
+                smoothing::choose(design, &parameters, &others, smoothing::points_with_weight(&weights)).0
             };
             let data = design.normal_of_groups(&sums, |group| group != g);
             let penalty = design.penalty(&data, smoothing.elastic, smoothing.friction);

@@ -83,7 +83,7 @@ fn by_order(
         Some(weight) => Smoothing { elastic: weight, friction: weight },
         None => {
             let groups = finer.design.normal_by_group(&finer.design.bin_sums(&parameters, weights));
-            smoothing::choose(&finer.design, &parameters, &groups, smoothing::weighted(weights)).0
+            smoothing::choose(&finer.design, &parameters, &groups, smoothing::points_with_weight(weights)).0
         }
     };
     let (weights, parameters) = robust(&finer, screen, weights, parameters, smoothing);

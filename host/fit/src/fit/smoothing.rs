@@ -119,7 +119,7 @@ pub(crate) fn choose_level(design: &Design, parameters: &[f64], groups: &[Normal
 }
 
 /// The number of points that have a weight.
-pub(crate) fn weighted(weights: &[f64]) -> usize {
+pub(crate) fn points_with_weight(weights: &[f64]) -> usize {
     weights.iter().filter(|w| **w > 0.0).count()
 }
 

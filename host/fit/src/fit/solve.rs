@@ -175,7 +175,13 @@ fn search(problem: Problem, screen: Screen, options: &Options, progress: &dyn Pr
                 let level = smoothing::choose_level(&problem.design, &parameters, &groups);
                 problem.design.level = level;
             }
-            smoothing::choose(&problem.design, &parameters, &groups, smoothing::weighted(&weights.values)).0
+            smoothing::choose(
+                &problem.design,
+                &parameters,
+                &groups,
+                smoothing::points_with_weight(&weights.values),
+            )
+            .0
         }
     };
     let data = problem.design.normal_of_groups(&sums, |_| true);
