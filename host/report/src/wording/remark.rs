@@ -30,7 +30,7 @@ pub fn remark(remark: &Remark) -> String {
             "no vented rows: an offset of the load cell is not identifiable".to_owned()
         }
         Remark::Wall => "near full contraction the force falls more steeply than four elastic orders can follow: jammed strands, or a \
-             bladder that stiffens (then fit with --order 6)"
+             bladder that stiffens (then fit with `--order 6`)"
             .to_owned(),
         Remark::Slack(share) => format!("{:.0} % of the rows excluded: muscle slack", 100.0 * share),
         Remark::FrictionAtRest(law) => friction_at_rest(*law),
