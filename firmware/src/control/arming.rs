@@ -80,16 +80,12 @@ impl Controller {
     /// Disarms a device whose owner has been silent: the program that armed it has ended, and no other may find it ready. One that runs
     /// in the mode that vents is as ready as an armed one.
     pub(super) fn disarm_when_silent(&mut self) {
-        // Every tick passes here, and hardly ever is an owner silent.
-        if self.owner_age <= self.settings.watch.armed_silence_ticks {
-            return;
-        }
         let is_ready = match self.machine.state() {
             State::Armed => true,
             State::Running => self.mode == Mode::Vent,
             State::Disarmed | State::Fault => false,
         };
-        if is_ready {
+        if is_ready && self.owner_age > self.settings.watch.armed_silence_ticks {
             // Allowed from `Armed` and `Running`.
             let _ = self.disarm();
         }
