@@ -212,7 +212,7 @@ fn excluded(solution: &Solution, out: &mut Vec<String>) {
     if pushed > 0 {
         out.push(format!(
             "excluded: {} where the rig pushes the muscle (force below zero by more than 3 %): the table describes its pull. Stop the stroke \
-             at zero force, or let `host diagnose` look for a contraction stop (strand-jamming)",
+             at zero force; `host diagnose` looks for the cause, for example a contraction stop or friction of a guide",
             pluralise(pushed, "row")
         ));
     }
