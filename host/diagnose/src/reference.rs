@@ -19,6 +19,7 @@
 //! | `repeatability` | how far untouched recordings differ: a Gaussian covariance |
 //! | `contrast` | generalised least squares and Bayes factors |
 //! | `lag` | delays between the channels, by rows in motion |
+//! | `closed_valves` | a leak, by the pressure that closed valves lose |
 //! | `unknown` | a smooth change that no name describes |
 //! | `weighing` | how strongly the cells support each change |
 //! | `gate` | a change must show without any single mounting |
@@ -39,12 +40,14 @@
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | [`answer`] | the answer as values |
 //! | [`correction`] | what the answer means for a table |
+//! | `updated` | the table of before with the changes of the actuator applied |
 //!
 //! The same recordings give the same answer on any number of threads.
 
 pub mod answer;
 mod catalogue;
 mod cells;
+mod closed_valves;
 mod combined;
 mod contrast;
 pub mod correction;
@@ -78,6 +81,7 @@ mod table_surface;
 mod tests;
 mod units;
 mod unknown;
+mod updated;
 mod weighing;
 mod withdrawal;
 

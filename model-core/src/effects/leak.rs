@@ -30,7 +30,12 @@ impl Effect for Leak {
 
     const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge)
         .check(BenchCheck::ReferenceGauge)
-        .changed(Changed::new(Class::Gain, Owner::RigOrMuscle, "air lost on the way costs pressure"));
+        .loses_air()
+        .changed(Changed::new(
+            Class::Gain,
+            Owner::RigOrMuscle,
+            "air lost on the way costs pressure; behind closed valves dP/dt = −λ·P",
+        ));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -context.pull_per_pressure() * parameters[0] * context.pressure

@@ -100,6 +100,8 @@ pub struct Traits {
     /// Whether it is looked for in the differences between recordings of one mounting only, where no static model hides it, and not in the
     /// search through the rows.
     pub between_recordings: bool,
+    /// Whether closed valves show it: their pressure falls.
+    pub loses_air: bool,
     /// How a change of it shows between two campaigns; `None` for what no comparison looks for.
     pub changed: Option<Changed>,
     /// Whether amplitudes and shapes that were fitted freely can belong to one and the same cause.
@@ -120,6 +122,7 @@ impl Traits {
             slow: false,
             imitates: None,
             between_recordings: false,
+            loses_air: false,
             changed: None,
             consistent: always,
         }
@@ -143,6 +146,11 @@ impl Traits {
     #[must_use]
     pub const fn between_recordings(self) -> Self {
         Self { between_recordings: true, ..self }
+    }
+    /// The same that closed valves show by a falling pressure.
+    #[must_use]
+    pub const fn loses_air(self) -> Self {
+        Self { loses_air: true, ..self }
     }
     /// The same, mistaken for something that is no effect.
     #[must_use]

@@ -5,6 +5,7 @@ mod course;
 mod cylinder;
 pub mod further;
 mod injection;
+mod leaks;
 mod page;
 mod pairs;
 mod single_effects;
@@ -289,21 +290,24 @@ pub fn run(what: &Reference) -> Result<(), Box<dyn Error>> {
         return write_pairs(what, &jobs, &trials, &slopes, muscles);
     }
     let against_tables = tables::run(&muscles, &slopes, what.short);
+    let leaks = leaks::run(&muscles, &slopes, what.short)?;
     let cylinder = cylinder::run(&what.data, what.short)?;
     let speed = page::speed(&muscles)?;
-    let text = page::page(&trials, &against_tables, &cylinder, speed, what.short);
+    let sections = leaks::section(&leaks) + &page::tables(&against_tables);
+    let text = page::page(&trials, &sections, &cylinder, speed, what.short);
     write(
         &what.output,
         "reference.json",
-        &serde_json::to_string_pretty(&(&trials, &cylinder, &against_tables))?,
+        &serde_json::to_string_pretty(&(&trials, &cylinder, &against_tables, &leaks))?,
     )?;
     write(&what.output, "reference.md", &text)?;
     if let Some(page) = &what.page {
         std::fs::write(page, &text)?;
     }
     println!(
-        "{} trials, {} against tables, and {} pairs of the cylinder in {:.0} s",
+        "{} trials, {} of leaks, {} against tables, and {} pairs of the cylinder in {:.0} s",
         trials.len(),
+        leaks.len(),
         against_tables.len(),
         cylinder.len(),
         start.elapsed().as_secs_f64()

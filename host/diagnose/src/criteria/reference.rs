@@ -69,6 +69,26 @@ pam_data::criteria! {
     LAG_RUNS: f64 = 4.0, "lag_runs", "1", Judgement;
     /// The sizes of lags that are equally likely beforehand.
     LAG_SIZES: ([f64; 5]) = [0.02, 0.05, 0.1, 0.2, 0.4], "lag_sizes", "s", Judgement;
+    /// Loss of closed valves: time since the last fast move of the pressure from which on its slope counts.
+    LOSS_AFTER: f64 = 0.1, "loss_after", "s", Judgement;
+    /// The shortest rest whose slope counts.
+    LOSS_SHORTEST: f64 = 0.1, "loss_shortest", "s", Judgement;
+    /// Rows of such a rest.
+    LOSS_ROWS: usize = 3, "loss_rows", "1", Derived("a line and one degree of freedom");
+    /// Rests at pressures below this share of the largest lose too little to count.
+    LOSS_PRESSURE: f64 = 0.1, "loss_pressure", "1", Judgement;
+    /// Rests that a run must have: its rate, what its gas does after a step, and a spread.
+    LOSS_RESTS: usize = 6, "loss_rests", "1", Judgement;
+    /// Slopes further than this many robust deviations from the line count less.
+    LOSS_CLIP: f64 = 2.0, "loss_clip", "1", Convention("Huber, two standard deviations");
+    /// Spread of the rate between campaigns that is always allowed: 12 kPa in two minutes at 500 kPa.
+    LOSS_FLOOR: f64 = 2e-4, "loss_floor", "1/s", Judgement;
+    /// Spread between runs beforehand ...
+    LOSS_SPREAD: f64 = 2e-3, "loss_spread", "1/s", Measured("development half, 0.001 to 0.003");
+    /// ... and the runs that it is worth.
+    LOSS_RUNS: f64 = 4.0, "loss_runs", "1", Judgement;
+    /// The sizes of a change of the rate that are equally likely beforehand: half a minute to half an hour until a third is left.
+    LOSS_SIZES: ([f64; 4]) = [5e-4, 2e-3, 8e-3, 3.2e-2], "loss_sizes", "1/s", Measured("leak-downs of fluidic muscles, 3e-4 to 1.5e-2");
     /// Variance of a median over that of a mean.
     MEDIAN_VARIANCE: f64 = 1.57, "median_variance", "1", Derived("pi/2");
     /// The values for fluidic muscles; for another actuator they are a prior, and the common scale adapts.
@@ -145,6 +165,13 @@ pam_data::criteria! {
     UNIT_FAR: f64 = 50.0, "unit_far", "1", Judgement;
     /// Two recordings that share this part of the smaller one's rows in motion overlap: rows in motion agree by chance in far fewer.
     SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
+    /// Recordings that reach over this share of the pressures and of the contractions that a table was tested at are a campaign: the table is
+    /// fitted anew to them.
+    UPDATE_COVERED: f64 = 0.8, "update_covered", "1", Judgement;
+    /// Pressures, or lengths, of such a campaign.
+    UPDATE_LEVELS: usize = 3, "update_levels", "1", Derived("a curve over the pressure");
+    /// Mean pressures nearer than this share of the largest are one.
+    UPDATE_SAME_LEVEL: f64 = 0.04, "update_same_level", "1", Convention("as LEVEL");
     /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.
     OTHER_LENGTH: f64 = 0.02, "other_length", "1", Judgement;
     /// A recording shows a change where its rms is more than this share of that in the recording that shows it most.

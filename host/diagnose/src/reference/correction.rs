@@ -1,11 +1,13 @@
-//! What the answer means for a table: a correction of the bench beside it, or a refit on AFTER.
+//! What the answer means for a table: a correction of the bench beside it, the change applied to it, or a refit on AFTER.
 
 use super::answer::{ChangeReport, Changed, Verdict};
 use super::shapes::Change;
+use super::updated;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
 use pam_fit::bench::Candidate;
+use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile};
 use pam_fit::{Options as FitOptions, fit};
 
@@ -16,6 +18,8 @@ pub enum Done {
     Unchanged,
     /// The bench's correction is beside the table of before.
     Corrected,
+    /// The table of before with the changes of the actuator: AFTER is no whole campaign.
+    Updated,
     /// The table is fitted anew to AFTER.
     Refitted,
 }
@@ -80,21 +84,51 @@ pub fn table(
         }
         Verdict::Explained | Verdict::PartlyExplained => {}
     }
-    if report.missing.iter().any(|m| !m.correction) {
+    let repair = |m: &Changed| {
+        let cause = format!(
+            "no table is written: `{}` is to be repaired at the bench, not corrected in a table",
+            m.effect
+        );
+        refused(cause, "leave -o out")
+    };
+    if let Some(m) = report.missing.iter().find(|m| updated::is_repaired(m)) {
+        return repair(m);
+    }
+    let of_actuator = report.missing.iter().any(|m| !m.correction);
+    let old = before();
+    let campaign = |old: &TableFile| updated::covers(after, &old.table);
+    if of_actuator && !old.as_ref().is_ok_and(|o| !campaign(o)) {
         return Ok((fitted(after, muscle)?, Done::Refitted));
     }
-    let mut file = before()?;
-    for m in &report.missing {
-        let Some(correction) = correction(m) else {
-            return refused(
-                format!(
-                    "no table is written: `{}` is to be repaired at the bench, not corrected in a table",
-                    m.effect
-                ),
-                "leave -o out",
-            );
-        };
+    let mut file = old?;
+    let plain = file.clone();
+    for m in report.missing.iter().filter(|m| m.correction) {
+        let Some(correction) = correction(m) else { return repair(m) };
         file.about.corrections.push(correction);
     }
-    Ok((file, Done::Corrected))
+    if !of_actuator {
+        return Ok((file, Done::Corrected));
+    }
+    match updated::updated(&file.table, report) {
+        Ok(table) => file.table = table,
+        Err(effect) => {
+            return refused(
+                format!(
+                    "no table is written: a table has no place for `{effect}`, and AFTER is no whole campaign"
+                ),
+                "record a campaign like the one before, or fit anew with `host fit`",
+            );
+        }
+    }
+    let rms = |file: &TableFile| Ok::<_, Error>(predict(file, after)?.rms.unwrap_or(f64::INFINITY));
+    let (without, with) = (rms(&plain)?, rms(&file)?);
+    if !(with < without && file.table.check().is_ok()) {
+        return refused(
+            format!(
+                "no table is written: with the change applied it would predict AFTER with an error of {with:.2} N, without it with {without:.2} N"
+            ),
+            "record a campaign like the one before, or fit anew with `host fit`",
+        );
+    }
+    Ok((file, Done::Updated))
 }

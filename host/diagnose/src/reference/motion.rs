@@ -11,8 +11,15 @@ pub(super) fn range(values: &[f64]) -> f64 {
     if high > low { high - low } else { 0.0 }
 }
 
-/// Rows long enough after the last fast move of the pressure.
+/// Rows long enough after the last fast move of the pressure; all rows where too few are.
 pub(super) fn settled(time: &[f64], pressure: &[f64]) -> Vec<bool> {
+    let settled = at_rest(time, pressure, SETTLE);
+    let count = settled.iter().filter(|s| **s).count();
+    if (count as f64) < FEWEST_SETTLED * time.len() as f64 { vec![true; time.len()] } else { settled }
+}
+
+/// Rows at least `since` s after the last fast move of the pressure.
+pub(super) fn at_rest(time: &[f64], pressure: &[f64], since: f64) -> Vec<bool> {
     let n = time.len();
     let limit = FAST_SHARE * range(pressure);
     let mut settled = vec![true; n];
@@ -41,10 +48,9 @@ pub(super) fn settled(time: &[f64], pressure: &[f64]) -> Vec<bool> {
         if (top - bottom).max(before) > limit {
             last = time[i];
         }
-        settled[i] = time[i] - last >= SETTLE && i > 0;
+        settled[i] = time[i] - last >= since && i > 0;
     }
-    let count = settled.iter().filter(|s| **s).count();
-    if (count as f64) < FEWEST_SETTLED * n as f64 { vec![true; n] } else { settled }
+    settled
 }
 
 /// The sign of a signal's motion between its reversals: 1 or −1 for every value.

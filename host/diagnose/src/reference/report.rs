@@ -12,7 +12,7 @@ use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
 use super::withdrawal::withdraw;
-use super::{catalogue, combined, sides, stages, table_surface, units};
+use super::{catalogue, closed_valves, combined, sides, stages, table_surface, units};
 use model_core::braid::Geometry;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
@@ -142,7 +142,6 @@ pub fn compare(after: &Campaign, against: Against<'_>, options: &Options) -> Res
     };
     report.samples = given.samples();
     report.muscle.clone_from(&options.muscle);
-    withdraw(&mut report);
     Ok(report)
 }
 
@@ -169,6 +168,13 @@ fn beside_recordings(
     report.reference.files = files(before);
     report.reference.samples = whole.samples();
     report.remarks.splice(0..0, remarks);
+    withdraw(&mut report);
+    if kind == Protocol::Held {
+        let runs = Runs::of(before, after, options.mounted)?;
+        if let Some(loss) = closed_valves::compare(&runs) {
+            closed_valves::add(&mut report, &loss, prior(options, PRIOR_NONE));
+        }
+    }
     Ok(report)
 }
 
@@ -217,6 +223,7 @@ fn beside_table(
     report.reference.table = Some(path.to_owned());
     report.remarks.splice(0..0, other);
     report.reference.repeatability_from = Repeatability::Assumed;
+    withdraw(&mut report);
     Ok(report)
 }
 

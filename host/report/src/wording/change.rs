@@ -131,6 +131,9 @@ pub fn remedy(change: Change) -> &'static str {
         Change::PressureSensorLag => {
             "look for a long or throttled line to the pressure sensor, and at its filter"
         }
+        Change::Effect(_) if change.effect().is_some_and(|e| e.traits().loses_air) => {
+            "close the valve for a minute and watch the pressure; look for leaks at fittings, valve and bladder"
+        }
         Change::Effect(_) => match (change.about().changed.owner, change.class()) {
             (Owner::Rig, _) => "look at the load path between muscle and load cell",
             (_, Class::RateOrPhase) => "look at hoses, valves and filters, then refit the table",
@@ -264,6 +267,7 @@ fn usual_unit(value: f64, unit: &str) -> (f64, String) {
         "s" if value.abs() < 1.0 => (1e3, "ms"),
         "m²" => (1e5, "N per 100 kPa"),
         "m/N" => (1e6, "µm/N"),
+        "1/s" => (6e3, "% per minute"),
         "" => (100.0, "%"),
         other => (1.0, other),
     };

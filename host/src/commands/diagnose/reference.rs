@@ -256,6 +256,9 @@ fn told(output: &Path, done: Done) -> String {
         Done::Corrected => {
             "the table of before with a correction of the bench beside it; a controller gets the same table as before"
         }
+        Done::Updated => {
+            "the table of before with the change of the actuator applied; a whole campaign after the change allows a new fit"
+        }
         Done::Refitted => "the table fitted anew to the recordings after the change",
     };
     format!("{}: {what}", output.display())

@@ -77,6 +77,11 @@ impl Slopes {
         self.largest
     }
 
+    /// N/Pa at a mounting and a pressure.
+    pub fn by_pressure(&self, mounting: usize, pressure: f64) -> f64 {
+        Self::at(&self.by_pressure[mounting], pressure)
+    }
+
     fn at(table: &[f64], pressure: f64) -> f64 {
         let z = ((pressure - ENDS.0) / (ENDS.1 - ENDS.0) * (NODES - 1) as f64).clamp(0.0, (NODES - 1) as f64);
         let i = (z as usize).min(NODES - 2);

@@ -363,10 +363,10 @@ pub fn replaced(page: &str, against_tables: &[Trial], pairs: &[Pair]) -> String 
     lines.collect::<Vec<_>>().join("\n") + "\n"
 }
 
-/// The page as Markdown.
+/// The page as Markdown; `further` holds the sections of leaks and of tables.
 pub fn page(
     trials: &[Trial],
-    against_tables: &[Trial],
+    further: &str,
     pairs: &[Pair],
     speed: Option<(usize, f64)>,
     short: bool,
@@ -383,7 +383,7 @@ pub fn page(
         injected(&mut text, trials);
         untouched(&mut text, trials);
         comparison(&mut text, trials);
-        text.push_str(&tables(against_tables));
+        text.push_str(further);
     }
     cylinder(&mut text, pairs);
     if let Some((rows, seconds)) = speed {

@@ -45,7 +45,7 @@ pub(super) const UNTESTED: &str = "\n## Not tested\n\n\
     - Several campaigns in the reference of strokes. Two simultaneous changes and the time of a change have a [page of their \
     own](proof-reference-further.md).\n\
     - A leak of a muscle that its valve supplies is not identifiable from force over measured pressure; strokes of a described muscle name it \
-    only within the class of gains. What closed valves lose is not used.\n\
+    only within the class of gains. The leaks of this page were added to the recordings; no pair with a real one is known.\n\
     - These pairs were seen while changes within AFTER, pairs of changes, and lags beside other changes were developed: no figure here is of \
     new muscles.\n\
     - A change that begins within AFTER and shows in one of its recordings alone is not judged on a held-out one.\n\

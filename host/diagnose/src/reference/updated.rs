@@ -1,0 +1,102 @@
+//! The table of before with the changes of the actuator applied: what minutes of recordings allow where a fit needs a campaign.
+
+use model_core::effects::FittedEffect;
+use model_core::table::MuscleTable;
+use pam_data::recording::Campaign;
+use pam_fit::bench::Candidate;
+
+use super::answer::{ChangeReport, Changed};
+use super::criteria::{SAME_STROKE, UPDATE_COVERED, UPDATE_LEVELS, UPDATE_SAME_LEVEL};
+use super::shapes::{Change, Class};
+
+/// Whether recordings reach over what the table was tested at, so that a table can be fitted to them.
+pub(super) fn covers(after: &Campaign, table: &MuscleTable) -> bool {
+    let rest = f64::from(table.geometry.rest_length.metres());
+    let tested = &table.tested;
+    let spans = |of: &dyn Fn(usize) -> (f64, f64), low: f64, high: f64| {
+        let all = (0..after.recordings.len()).map(of);
+        let (least, most) =
+            all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
+        most - least >= UPDATE_COVERED * (high - low)
+    };
+    let ends = |values: &[f64]| {
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
+    };
+    let pressures = spans(
+        &|i| ends(&after.recordings[i].pressure),
+        f64::from(tested.pressure_low.pascals()),
+        f64::from(tested.pressure_high.pascals()),
+    );
+    let strokes = spans(
+        &|i| ends(&after.recordings[i].stroke),
+        rest * f64::from(tested.contraction_low),
+        rest * f64::from(tested.contraction_high),
+    );
+    pressures && strokes && levels(after, f64::from(tested.pressure_high.pascals())) >= UPDATE_LEVELS
+}
+
+/// Pressures, or lengths, that were recorded: the larger number.
+fn levels(after: &Campaign, largest: f64) -> usize {
+    let distinct = |values: Vec<f64>, apart: f64| {
+        let mut sorted = values;
+        sorted.sort_by(f64::total_cmp);
+        let mut kept: Vec<f64> = Vec::new();
+        for v in sorted {
+            if kept.last().is_none_or(|k| v - k > apart) {
+                kept.push(v);
+            }
+        }
+        kept.len()
+    };
+    let middle = |values: &[f64]| {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied()
+    };
+    let of = |column: &dyn Fn(usize) -> Option<f64>| (0..after.recordings.len()).filter_map(column).collect();
+    let pressures = distinct(of(&|i| middle(&after.recordings[i].pressure)), UPDATE_SAME_LEVEL * largest);
+    let strokes = distinct(of(&|i| middle(&after.recordings[i].stroke)), SAME_STROKE);
+    pressures.max(strokes)
+}
+
+/// Whether a change is repaired at the bench: a slip of an end, and lost air.
+pub(super) fn is_repaired(changed: &Changed) -> bool {
+    changed.class == Class::EndSlip || changed.change.effect().is_some_and(|e| e.traits().loses_air)
+}
+
+/// Applies one change to the table; `false` where the table has no place for it.
+fn apply(table: &mut MuscleTable, changed: &Changed) -> bool {
+    let Some(size) = changed.parameters.first().map(|p| p.value) else { return false };
+    match changed.change {
+        Change::ElasticStiffening => {
+            let curves = table.elastic.iter_mut().flatten();
+            curves.for_each(|e| *e = (f64::from(*e) * (1.0 + size)) as f32);
+            true
+        }
+        Change::FrictionFactor => {
+            table.friction.iter_mut().for_each(|k| *k = (f64::from(*k) + size) as f32);
+            true
+        }
+        change => match change.effect() {
+            Some(Candidate::Muscle(effect)) if effect.info().parameters.len() == changed.parameters.len() => {
+                let values: Vec<f64> = changed.parameters.iter().map(|p| p.value).collect();
+                table.effects.push(FittedEffect::new(effect, &values)).is_ok()
+            }
+            _ => false,
+        },
+    }
+}
+
+/// The table with all changes of the actuator; the name of the first that it has no place for.
+///
+/// # Errors
+/// That name.
+pub(super) fn updated(table: &MuscleTable, report: &ChangeReport) -> Result<MuscleTable, String> {
+    let mut new = table.clone();
+    for changed in report.missing.iter().filter(|m| !m.correction) {
+        if !apply(&mut new, changed) {
+            return Err(changed.effect.clone());
+        }
+    }
+    Ok(new)
+}
