@@ -18,3 +18,4 @@ mod plan;
 mod real_recordings;
 mod reference;
 mod stock;
+mod updated_table;

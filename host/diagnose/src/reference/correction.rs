@@ -109,8 +109,8 @@ pub fn table(
     if !of_actuator {
         return Ok((file, Done::Corrected));
     }
-    match updated::updated(&file.table, report) {
-        Ok(table) => file.table = table,
+    match updated::updated(&file, report, after) {
+        Ok(updated) => file = updated,
         Err(effect) => {
             return refused(
                 format!(

@@ -4,10 +4,15 @@ use model_core::effects::FittedEffect;
 use model_core::table::MuscleTable;
 use pam_data::recording::Campaign;
 use pam_fit::bench::Candidate;
+use pam_fit::predict::predict;
+use pam_fit::table_file::TableFile;
 
 use super::answer::{ChangeReport, Changed};
 use super::criteria::{SAME_STROKE, UPDATE_COVERED, UPDATE_LEVELS, UPDATE_SAME_LEVEL};
 use super::shapes::{Change, Class};
+
+/// Laws of one effect, at most.
+const MOST_LAWS: usize = 2;
 
 /// Whether recordings reach over what the table was tested at, so that a table can be fitted to them.
 pub(super) fn covers(after: &Campaign, table: &MuscleTable) -> bool {
@@ -64,8 +69,8 @@ pub(super) fn is_repaired(changed: &Changed) -> bool {
     changed.class == Class::EndSlip || changed.change.effect().is_some_and(|e| e.traits().loses_air)
 }
 
-/// Applies one change to the table; `false` where the table has no place for it.
-fn apply(table: &mut MuscleTable, changed: &Changed) -> bool {
+/// Applies one change to the table; `false` where the table has no place for it. `which`: the law that a size without a law belongs to.
+fn apply(table: &mut MuscleTable, changed: &Changed, which: usize) -> bool {
     let Some(size) = changed.parameters.first().map(|p| p.value) else { return false };
     match changed.change {
         Change::ElasticStiffening => {
@@ -77,26 +82,55 @@ fn apply(table: &mut MuscleTable, changed: &Changed) -> bool {
             table.friction.iter_mut().for_each(|k| *k = (f64::from(*k) + size) as f32);
             true
         }
-        change => match change.effect() {
-            Some(Candidate::Muscle(effect)) if effect.info().parameters.len() == changed.parameters.len() => {
-                let values: Vec<f64> = changed.parameters.iter().map(|p| p.value).collect();
-                table.effects.push(FittedEffect::new(effect, &values)).is_ok()
-            }
-            _ => false,
+        change => match change.effect().and_then(|e| law(e, changed, which)) {
+            Some(effect) => table.effects.push(effect).is_ok(),
+            None => false,
         },
     }
 }
 
-/// The table with all changes of the actuator; the name of the first that it has no place for.
-///
-/// # Errors
-/// That name.
-pub(super) fn updated(table: &MuscleTable, report: &ChangeReport) -> Result<MuscleTable, String> {
-    let mut new = table.clone();
-    for changed in report.missing.iter().filter(|m| !m.correction) {
-        if !apply(&mut new, changed) {
-            return Err(changed.effect.clone());
+/// The effect with the sizes of the change, by their names. `None` for a law that a table does not have.
+fn law(candidate: Candidate, changed: &Changed, which: usize) -> Option<FittedEffect> {
+    let Candidate::Muscle(effect) = candidate else { return None };
+    let listed = effect.info().parameters;
+    let position = |name: &str| listed.iter().position(|p| p.name == name);
+    let mut values = vec![0.0; listed.len()];
+    match changed.parameters.as_slice() {
+        [only] if position(&only.name).is_none() && listed.len() == effect.info().amplitudes() => {
+            *values.get_mut(which)? = only.value;
+        }
+        several => {
+            for p in several {
+                values[position(&p.name)?] = p.value;
+            }
         }
     }
-    Ok(new)
+    Some(FittedEffect::new(effect, &values))
+}
+
+/// The table with all changes of the actuator. Recordings at held lengths give friction one size, and an effect may have several laws for it:
+/// the one that predicts AFTER best is taken.
+///
+/// # Errors
+/// The name of the first change that a table has no place for.
+pub(super) fn updated(
+    file: &TableFile,
+    report: &ChangeReport,
+    after: &Campaign,
+) -> Result<TableFile, String> {
+    let mut best: Option<(f64, TableFile)> = None;
+    let mut without_place = String::new();
+    for which in 0..MOST_LAWS {
+        let mut new = file.clone();
+        let own = report.missing.iter().filter(|m| !m.correction);
+        if let Some(m) = own.clone().find(|m| !apply(&mut new.table, m, which)) {
+            without_place.clone_from(&m.effect);
+            continue;
+        }
+        let rms = predict(&new, after).ok().and_then(|p| p.rms).unwrap_or(f64::INFINITY);
+        if best.as_ref().is_none_or(|(least, _)| rms < *least) {
+            best = Some((rms, new));
+        }
+    }
+    best.map(|(_, file)| file).ok_or(without_place)
 }
