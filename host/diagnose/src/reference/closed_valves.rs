@@ -1,19 +1,21 @@
 //! A leak, by the pressure that closed valves lose.
 //!
-//! Between the pulses of a staircase the valves are closed. There the pressure changes by the leak, in proportion to itself, and by what the
-//! gas does after a step: it cools after filling and warms after venting, in proportion to the step. In each run
+//! Between the pulses of a staircase the valves are closed. There the pressure changes by what the gas does after a step, which cools after
+//! filling and warms after venting, and by the leak, in proportion to itself: `dP/dt = … − λ·P`. What the gas does depends on the pressure,
+//! the step and its direction; so each rest is compared with rests of BEFORE that are alike in these, and a run's change of rate is
 //!
 //! ```text
-//! dP/dt = −λ·P + κ·ΔP
+//! λ = −Σ P·(dP/dt − mean of BEFORE) / Σ P²
 //! ```
 //!
-//! over its rests gives the rate λ, 1/s. A regulator that replaces what is lost hides the leak: its rests have no slope on either side.
+//! Other pulses have no rests alike, and show no change. A regulator that replaces what is lost hides the leak: its rests have no slope on
+//! either side.
 
 use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdict, WhyNot, size};
 use super::contrast::log_mean;
 use super::criteria::{
-    LOSS_AFTER, LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST,
-    LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
+    LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_STEP, LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS,
+    LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
 };
 use super::motion;
 use super::runs::{Run, Runs};
@@ -78,24 +80,32 @@ fn rests(run: &Run) -> Vec<Rest> {
     all
 }
 
-/// The rate that the rests of a run show, 1/s: robust least squares.
-fn rate(rests: &[Rest]) -> Option<f64> {
-    if rests.len() < LOSS_RESTS {
+/// Whether two rests differ by no more than pulses of one setting do. `range`: of the pressures, Pa.
+fn alike(a: &Rest, b: &Rest, range: f64) -> bool {
+    let ratio = a.step / b.step;
+    (a.pressure - b.pressure).abs() <= LOSS_ALIKE_PRESSURE * range
+        && ratio >= 1.0 - LOSS_ALIKE_STEP
+        && ratio <= 1.0 / (1.0 - LOSS_ALIKE_STEP)
+}
+
+/// By how much the rate of a run differs from rests of BEFORE that are alike, 1/s: robust.
+fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
+    let beside = own.iter().filter_map(|rest| {
+        let slopes = before.iter().filter(|b| alike(rest, b, range)).map(|b| b.slope);
+        let mean = mean(slopes.clone());
+        (slopes.count() > 0).then_some((rest.pressure, rest.slope - mean))
+    });
+    let beside: Vec<(f64, f64)> = beside.collect();
+    if beside.len() < LOSS_RESTS {
         return None;
     }
-    let mut weights = vec![1.0; rests.len()];
+    let mut weights = vec![1.0; beside.len()];
     let mut rate = 0.0;
     for _ in 0..REWEIGHTED {
-        let sum = |f: &dyn Fn(&Rest) -> f64| rests.iter().zip(&weights).map(|(r, w)| w * f(r)).sum::<f64>();
-        let (pp, ps, ss) =
-            (sum(&|r| r.pressure * r.pressure), sum(&|r| r.pressure * r.step), sum(&|r| r.step * r.step));
-        let (py, sy) = (sum(&|r| r.pressure * r.slope), sum(&|r| r.step * r.slope));
-        // Without steps the gas says nothing: then the slope is the leak's alone.
-        let determinant = pp * ss - ps * ps;
-        let gas = if determinant > 1e-9 * pp * ss { (pp * sy - ps * py) / determinant } else { 0.0 };
-        rate = -(py - gas * ps) / pp;
-        let residuals: Vec<f64> =
-            rests.iter().map(|r| (r.slope + rate * r.pressure - gas * r.step).abs()).collect();
+        let sum =
+            |f: &dyn Fn(&(f64, f64)) -> f64| beside.iter().zip(&weights).map(|(r, w)| w * f(r)).sum::<f64>();
+        rate = -sum(&|r| r.0 * r.1) / sum(&|r| r.0 * r.0);
+        let residuals: Vec<f64> = beside.iter().map(|(p, e)| (e + rate * p).abs()).collect();
         let mut sorted = residuals.clone();
         sorted.sort_by(f64::total_cmp);
         let limit = LOSS_CLIP * 1.4826 * sorted[sorted.len() / 2];
@@ -104,13 +114,22 @@ fn rate(rests: &[Rest]) -> Option<f64> {
     rate.is_finite().then_some(rate)
 }
 
-/// AFTER's rates against BEFORE's in the mountings that both have; `None` where fewer than one run a side has rests enough.
+/// AFTER's rates against BEFORE's in the mountings that both have; `None` where no mounting has rests alike on both sides.
 pub(super) fn compare(runs: &Runs) -> Option<Loss> {
     if runs.moving {
         return None;
     }
-    let rates: Vec<(usize, bool, f64)> =
-        runs.runs.iter().filter_map(|r| Some((r.mounting, r.after, rate(&rests(r))?))).collect();
+    let all: Vec<(&Run, Vec<Rest>)> = runs.runs.iter().map(|r| (r, rests(r))).collect();
+    let pressures = || runs.side(false).flat_map(|r| r.pressure.iter().copied());
+    let range = pressures().fold(f64::NEG_INFINITY, f64::max) - pressures().fold(f64::INFINITY, f64::min);
+    let mut rates: Vec<(usize, bool, f64)> = Vec::new();
+    for mounting in 0..runs.strokes.len() {
+        let own = || all.iter().filter(|(r, _)| r.mounting == mounting);
+        let before: Vec<&Rest> = own().filter(|(r, _)| !r.after).flat_map(|(_, rests)| rests).collect();
+        let one =
+            |(run, rests): &(&Run, Vec<Rest>)| Some((mounting, run.after, rate(rests, &before, range)?));
+        rates.extend(own().filter_map(one));
+    }
     let side = |mounting: usize, after: bool| {
         let own: Vec<f64> = rates.iter().filter(|r| r.0 == mounting && r.1 == after).map(|r| r.2).collect();
         own
