@@ -49,8 +49,8 @@ pub struct Study {
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
 /// Stages whose criteria loops of the virtual bench do not reach: comparisons with a reference, campaigns over months, isometric
-/// runs, proposals of recordings.
-const OTHER_DATA: [&str; 5] = ["reference", "history", "timeline", "experiment", "valve"];
+/// runs, proposals of recordings, the health of a table on a controller, stocks of muscles.
+const OTHER_DATA: [&str; 7] = ["reference", "history", "timeline", "experiment", "valve", "health", "stock"];
 
 /// What the trials showed with one criterion scaled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -215,17 +215,18 @@ fn criterion(name: &str) -> Option<&'static Criterion> {
 
 /// The table of all criteria that change an answer, those that change none, and those that have not been measured.
 fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
-    let mut m = String::from(
+    let mut m = format!(
         "# Sensitivity of the diagnosis to its criteria\n\n\
          Each criterion of `host/diagnose/src/criteria` at half and at double its value, on the same trials of a development set of the \
          virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and more whose first name is of the right class. \
          \"Answers changed\" counts trials that name something else than with the criteria as they are.\n\n\
          ```text\n\
-         cargo run --release -p trials -- generate --set dev -o SET\n\
+         cargo run --release -p trials -- generate --set dev --n {} -o SET\n\
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
          These commands wrote this page. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
          on each of them, not how good they are.\n\n",
+        nominal.named.len()
     );
     let rate = |k: usize, n: usize| Rate::new(k, n).to_string();
     let _ = writeln!(
@@ -269,7 +270,8 @@ fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
     }
     m.push_str(
         "\nNot in this study: limits of computing time, sizes of arrays, and the criteria of comparisons with a reference, of campaigns \
-         over months, of isometric runs and of proposed recordings. Loops of the virtual bench do not reach them.\n",
+         over months, of isometric runs, of proposed recordings, of the health of a table on a controller, and of stocks. Loops of the virtual \
+         bench do not reach them.\n",
     );
     m
 }

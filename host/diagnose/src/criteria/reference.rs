@@ -81,6 +81,8 @@ pam_data::criteria! {
     LOSS_ALIKE_PRESSURE: f64 = 0.05, "loss_alike_pressure", "1", Judgement;
     /// ... and the steps before them by no more than this share: pulses of another length differ by more.
     LOSS_ALIKE_STEP: f64 = 0.2, "loss_alike_step", "1", Measured("pulses of 10 and 5 ms, 30 to 60 ms");
+    /// Share of a run's rests that have one alike in BEFORE; with fewer the valves were set otherwise, and nothing is said.
+    LOSS_ALIKE_SHARE: f64 = 0.8, "loss_alike_share", "1", Convention("as UPDATE_COVERED");
     /// Rests alike on both sides that a run must have.
     LOSS_RESTS: usize = 6, "loss_rests", "1", Judgement;
     /// Slopes further than this many robust deviations from the line count less.

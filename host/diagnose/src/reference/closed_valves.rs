@@ -14,8 +14,9 @@
 use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdict, WhyNot, size};
 use super::contrast::log_mean;
 use super::criteria::{
-    LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_STEP, LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS,
-    LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
+    FAST_SHARE, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP, LOSS_CLIP, LOSS_FLOOR,
+    LOSS_PRESSURE, LOSS_RESTS, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES, LOSS_SPREAD, NAMED,
+    PRIOR_UNKNOWN, SET,
 };
 use super::motion;
 use super::runs::{Run, Runs};
@@ -59,6 +60,7 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
 fn rests(run: &Run) -> Vec<Rest> {
     let rows = motion::at_rest(&run.time, &run.pressure, LOSS_AFTER);
     let largest = run.pressure.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
+    let range = motion::range(&run.pressure);
     let mut all = Vec::new();
     let (mut start, mut last_end): (usize, Option<f64>) = (0, None);
     for part in rows.chunk_by(|a, b| a == b) {
@@ -75,7 +77,11 @@ fn rests(run: &Run) -> Vec<Rest> {
         let Some(before) = before.filter(|_| p > LOSS_PRESSURE * largest && slope.is_finite()) else {
             continue;
         };
-        all.push(Rest { slope, pressure: p, step: pressure[0] - before });
+        let step = pressure[0] - before;
+        // Without a step before it, several pulses are one rest: the supply replaces what is lost.
+        if step.abs() > FAST_SHARE * range {
+            all.push(Rest { slope, pressure: p, step });
+        }
     }
     all
 }
@@ -96,7 +102,7 @@ fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
         (slopes.count() > 0).then_some((rest.pressure, rest.slope - mean))
     });
     let beside: Vec<(f64, f64)> = beside.collect();
-    if beside.len() < LOSS_RESTS {
+    if beside.len() < LOSS_RESTS || (beside.len() as f64) < LOSS_ALIKE_SHARE * own.len() as f64 {
         return None;
     }
     let mut weights = vec![1.0; beside.len()];
