@@ -53,7 +53,7 @@ impl<F: NorFlash> Answers<'_, F> {
     }
 
     /// What a host has kept is changed only while every muscle is vented, because a flash may stop the processor, and not while the
-    /// device is armed: whoever armed it relies on the settings and tables of then.
+    /// device is armed: the session that armed it relies on the settings and tables of then.
     fn at_rest(&self) -> Result<(), Refusal> {
         self.shared.with(|controller| match controller.state() {
             State::Disarmed | State::Fault if controller.is_vented() => Ok(()),

@@ -33,7 +33,7 @@ fn main() -> io::Result<()> {
     let mut text = String::from(
         "# Stability with a wrong table\n\nWritten by `cargo run -p emulator-tests --bin stability`. Force control with table and \
          trim. Each curve and number of the fitted table is multiplied by a factor, one after another. The last two rows of each muscle \
-         are the corner of all of them in which the slope ∂F/∂P is furthest from that of the muscle, and its opposite. Errors of a sine of \
+         are corners, where all of them are wrong: the one whose slope ∂F/∂P is furthest from that of the muscle, and its opposite. Errors of a sine of \
          1 Hz and of a force that is held, rms in % of blocked force; swing and change of the command as in \
          [tracking.md](tracking.md).\n\nThe slope error is the largest |g* − g|/g between 30 and 100 % of the highest pressure and up to 34 % \
          of the free stroke, with the slope g of the table and g* of the muscle. The gain of the trim's loop is \
