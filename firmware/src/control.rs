@@ -7,8 +7,8 @@
 //! ```
 //! Watches look at every tick before the command is made, so a fault changes the command of the tick it is noticed in.
 
-use model_core::link::messages::{Fault, FaultReport, MeanSignals, Mode, Session, Side, State};
-use model_core::link::settings::{Reaction, Settings};
+use model_core::link::messages::{Fault, MeanSignals, Mode, Session, Side, State};
+use model_core::link::settings::Settings;
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::scalar::Scalar;
 use model_core::single_precision;
@@ -20,7 +20,7 @@ use crate::modes::{Model, Seat};
 use crate::pair::PairState;
 use crate::reference::Generator;
 use crate::regulator::Law;
-use crate::safety::{self, Machine};
+use crate::safety::Machine;
 use crate::signals::{self, Filters};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
@@ -30,6 +30,7 @@ mod actuator;
 mod arming;
 mod check;
 mod drive;
+mod latch;
 mod monitor;
 mod record;
 mod requests;
@@ -288,53 +289,6 @@ impl Controller {
 
     fn uses(&self, side: Side) -> bool {
         side == Side::Agonist || self.mode == Mode::Pair
-    }
-
-    /// Latches a fault.
-    pub fn raise(&mut self, side: Side, finding: &Finding) {
-        let report = self.report(side, finding);
-        if !self.machine.fault(&report) {
-            return;
-        }
-        self.notice = Some(Notice::Fault);
-        self.trace.on_fault();
-        self.held_ticks = 0;
-        // A fault of a start that never ran leaves nothing pressurised.
-        let vents = safety::reaction(finding.fault, self.settings.hold_on) == Reaction::Vent;
-        if vents || report.from != State::Running || self.settings.watch.hold_ticks == 0 {
-            self.vent_now();
-        }
-    }
-
-    /// A fault while one is latched: counted when it comes up; one that vents ends a hold.
-    fn raise_again(&mut self, side: Side, finding: &Finding, ends_hold: bool) {
-        let holds = !self.is_vented();
-        if !(holds && ends_hold) {
-            if self.present != Some(finding.fault) {
-                let report = self.report(side, finding);
-                self.machine.fault(&report);
-            }
-            return;
-        }
-        let report = self.report(side, finding);
-        self.machine.ended_hold(&report);
-        self.vent_now();
-        // The link's task keeps the report, now that nothing is held.
-        self.notice = Some(Notice::State(State::Fault));
-    }
-
-    fn report(&self, side: Side, finding: &Finding) -> FaultReport {
-        FaultReport {
-            fault: finding.fault,
-            side,
-            sensor: finding.sensor,
-            from: self.machine.state(),
-            mode: self.mode,
-            time_us: self.time_us(),
-            value: finding.value,
-            limit: finding.limit,
-            last: self.sides[side.index()].sample,
-        }
     }
 
     /// One millisecond. What it says to the host is left for [`Controller::take_event`] and [`Controller::take_sample`].

@@ -22,10 +22,11 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
 use firmware::board::{Inputs, Readings};
 use firmware::control::Controller;
+use firmware::health::Health;
 use firmware::modes::Model;
 use model_core::effects::{EffectName, FittedEffect, MAX_PARAMETERS};
 use model_core::image;
-use model_core::link::messages::{Mode, Reference, ReferenceOrder, Session, Side};
+use model_core::link::messages::{HealthSums, Mode, Reference, ReferenceOrder, Session, Side};
 use model_core::link::settings::Settings;
 use model_core::motion::Motion;
 use model_core::muscle::Muscle;
@@ -178,19 +179,24 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
     direct.say("direct-port");
 }
 
-/// The whole 1 kHz step in force control: muscle moving, wave of force, telemetry at every tenth tick.
-fn whole_step(table: &MuscleTable) {
-    static CONTROLLER: StaticCell<Controller> = StaticCell::new();
-    let controller = CONTROLLER.init_with(|| Controller::new(&Settings::default()));
-    if controller.use_table(Side::Agonist, table).is_err() {
-        return;
+/// The whole 1 kHz step in force control: muscle moving, wave of force, telemetry at every tenth tick. The load cell is compared with
+/// the table, or, as in a stroke that the table was not tested in, it is not.
+fn whole_step(controller: &mut Controller, table: &MuscleTable, compared: bool) -> Option<Sweep> {
+    let mut table = table.clone();
+    if !compared {
+        // Only the comparison looks at what was tested.
+        table.tested.pressure_low = Pressure::from_pascals(0.0);
+        table.tested.pressure_high = Pressure::from_pascals(1e3);
     }
+    controller.use_table(Side::Agonist, &table).ok()?;
     let inputs = |pressure_pa, stroke_m, force_n| Inputs {
         sides: [Some(Readings { pressure_pa, stroke_m, force_n }.into()), None],
         ..Inputs::default()
     };
     // Empty, as it must be to be armed.
-    controller.step(&inputs(0.0, 0.9e-3, 0.0));
+    for tick in 0..100_u32 {
+        controller.step(&inputs((tick % 2) as f32, 0.9e-3, 0.0));
+    }
     let wave = Reference::Sine { mean: 45.0, amplitude: 20.0, frequency_hz: 2.0 };
     let owner = Session::default();
     let began = controller.arm(owner).is_ok()
@@ -219,11 +225,31 @@ fn whole_step(table: &MuscleTable) {
         pressure += (wanted - pressure) * 0.03 + if tick % 2 == 0 { 3.0 } else { -3.0 };
         sweep.add(spent as f32 * INSTRUCTIONS_PER_TICK);
     }
-    if began && controller.mode() == Mode::Force {
-        sweep.say("step");
+    let mut sums = HealthSums::default();
+    controller.health(Side::Agonist).describe(&mut sums);
+    if began && controller.mode() == Mode::Force && (sums.blocks > 0) == compared {
+        // Allowed in every state.
+        let _ = controller.disarm();
+        Some(sweep)
     } else {
         hprintln!("the step did not run: {:?}", controller.faults().latched);
+        None
     }
+}
+
+/// The step, and what it takes more where the load cell is compared with the table.
+fn steps(table: &MuscleTable) {
+    static CONTROLLER: StaticCell<Controller> = StaticCell::new();
+    let controller = CONTROLLER.init_with(|| Controller::new(&Settings::default()));
+    let Some(with) = whole_step(controller, table, true) else { return };
+    let Some(without) = whole_step(controller, table, false) else { return };
+    with.say("step");
+    let mean = |sweep: &Sweep| sweep.sum / sweep.points.max(1) as f32;
+    // The countdown to a sample runs in both.
+    let mut idle = Health::default();
+    let countdown = instructions(64, (), |()| idle.tick());
+    let (more, worst) = (mean(&with) - mean(&without), with.worst - without.worst);
+    hprintln!("health-of-step {:.1} {:.1} {}", more + countdown, worst + countdown, with.points);
 }
 
 /// Instructions of a tick of a model whose table carries these effects.
@@ -288,7 +314,7 @@ fn main() -> ! {
     if let Ok(muscle) = Muscle::<f32>::build(&table) {
         functions(&table, &muscle);
     }
-    whole_step(&table);
+    steps(&table);
     effects(&table);
     hprintln!("end 0 0 0");
     loop {

@@ -176,6 +176,13 @@ impl RegulatorState {
         };
     }
 
+    /// Demands anew from where the muscle is; the model of line and muscle continues.
+    pub fn demand_from(&mut self, pressure_pa: f32) {
+        let Self { supplied_pa, model_pa, .. } = *self;
+        self.begin(pressure_pa);
+        *self = Self { supplied_pa, model_pa, ..*self };
+    }
+
     /// Takes a tick's measured pressure: its difference from the model is added slowly to the command. This corrects drift of the
     /// regulator's zero and gain, and its ripple; lag and line are in the model and cause no correction.
     #[inline]

@@ -66,14 +66,14 @@ class Board:
                 return True
         return self.chip.run(end - self.chip.now, until)
 
-    def restarted(self, within=0.5):
+    def restarted(self, within=0.5, settle=0.5):
         """Waits for a restart and for the board to be up again."""
         restarts = self.chip.restarts
         self.chip.run(within, lambda: len(restarts) > self.restarts)
         assert len(restarts) > self.restarts, "it does not restart"
         self.restarts = len(restarts)
         self.chip.at(self.chip.now, self.step)
-        self.chip.run(0.5)
+        self.chip.run(settle)
         return self.chip.restarts[-1]
 
     def arm(self):

@@ -92,9 +92,12 @@ impl Controller {
     }
 
     fn arm_now(&mut self) -> Result<(), Refusal> {
+        let continues = self.machine.state() == State::Armed;
         self.change(Cause::Arm)?;
-        for side in &mut self.sides {
-            side.watch.restart();
+        if !continues {
+            for side in &mut self.sides {
+                side.watch.restart();
+            }
         }
         Ok(())
     }

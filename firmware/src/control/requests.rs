@@ -29,7 +29,8 @@ impl Controller {
         Ok(())
     }
 
-    /// Starts a mode at what is measured now, for a session that has to keep it alive.
+    /// Starts a mode at what is measured now, for a session that has to keep it alive. While one runs, the watches and the regulator's
+    /// model continue: a start that is repeated must not give a burst more time.
     ///
     /// # Errors
     /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::OtherSession`] where another session owns the device and
@@ -48,6 +49,7 @@ impl Controller {
             self.raise(side, &none);
             return Err(Refusal::NoTable(side));
         }
+        let continues = self.machine.state() == State::Running;
         self.change(Cause::Start)?;
         self.own(session);
         self.mode = mode;
@@ -64,12 +66,18 @@ impl Controller {
         };
         self.setpoint_age = 0;
         for side in &mut self.sides {
-            side.regulator.begin(side.sample.pressure_pa);
+            match (continues, side.command.vent) {
+                (true, false) => {}
+                (true, true) => side.regulator.demand_from(side.sample.pressure_pa),
+                (false, _) => {
+                    side.regulator.begin(side.sample.pressure_pa);
+                    side.watch.restart();
+                }
+            }
             side.trim.reset();
             side.stroke_loop.reset();
             side.guess_pa = side.sample.pressure_pa;
             side.saturation = 0.0;
-            side.watch.restart();
         }
         if mode == Mode::Pair
             && let Some(arms) = self.arms()

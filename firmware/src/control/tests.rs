@@ -15,6 +15,7 @@ mod joint;
 mod ownership;
 mod recorded;
 mod refusals;
+mod repeated;
 mod silences;
 mod tracking;
 mod valve_test;

@@ -11,7 +11,6 @@ use super::*;
 mod demand;
 mod exchange;
 mod friction;
-mod laws;
 
 /// The example's braid: rest length and length of a fibre, m, and its turns.
 fn braid() -> (f64, f64, f64) {

@@ -52,10 +52,12 @@ impl<F: NorFlash> Answers<'_, F> {
         Ok(())
     }
 
-    /// The store may only be written while every muscle is vented and nothing is controlled: a flash may stop the processor.
+    /// What a host has kept is changed only while every muscle is vented, because a flash may stop the processor, and not while the
+    /// device is armed: the session that armed it relies on the settings and tables of then.
     fn at_rest(&self) -> Result<(), Refusal> {
-        self.shared.with(|controller| {
-            if controller.is_vented() { Ok(()) } else { Err(Refusal::WrongState(controller.state())) }
+        self.shared.with(|controller| match controller.state() {
+            State::Disarmed | State::Fault if controller.is_vented() => Ok(()),
+            state => Err(Refusal::WrongState(state)),
         })
     }
 
@@ -265,14 +267,9 @@ impl<F: NorFlash> Service for Answers<'_, F> {
 
     fn restart(&mut self, (): &(), (): &mut ()) -> Result<(), Refusal> {
         self.at_rest()?;
-        match self.shared.with(|controller| controller.state()) {
-            state @ (State::Running | State::Armed) => Err(Refusal::WrongState(state)),
-            State::Disarmed | State::Fault => {
-                self.server.keep_all(self.shared);
-                self.server.restart = true;
-                Ok(())
-            }
-        }
+        self.server.keep_all(self.shared);
+        self.server.restart = true;
+        Ok(())
     }
 
     fn health(&mut self, request: &HealthRead, answer: &mut HealthSums) -> Result<(), Refusal> {

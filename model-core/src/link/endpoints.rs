@@ -159,17 +159,17 @@ endpoints! {
     13 clear_fault ClearFault: () => Status;
     /// The settings in force.
     14 settings GetSettings: () => Settings;
-    /// Checks, keeps and uses settings, and confirms them where they could not be trusted; only while every muscle is vented.
+    /// Checks, keeps and uses settings, and confirms them where they could not be trusted; only while disarmed or in a fault, vented.
     15 set_settings SetSettings: Settings => Settings;
     /// Begins the upload of a table, which takes the shared buffer from the trace: its records are lost.
     16 table_begin BeginTable: TableBegin => ();
     /// The next piece; the answer is how many bytes are there.
     17 table_piece SendTablePiece: TablePiece => u32;
-    /// Checks the whole table, uses it, keeps it; only while every muscle is vented.
+    /// Checks the whole table, uses it, keeps it; only while disarmed or in a fault, vented.
     18 table_commit CommitTable: () => TableInfo;
     /// A piece of the kept table; empty behind its end.
     19 table_read ReadTable: TableRead => TablePiece;
-    /// Goes back to the table before the one of this generation; asked again, it is done once. Only while every muscle is vented.
+    /// Goes back to the table before the one of this generation; asked again, it is done once. Only while disarmed or in a fault, vented.
     20 table_rollback RollBackTable: RollBack => TableInfo;
     /// What the table says at some points.
     21 evaluate EvaluateTable: Evaluate => Evaluated;
@@ -179,7 +179,7 @@ endpoints! {
     23 trace_info GetTrace: () => TraceInfo;
     /// Values of the trace.
     24 trace_read ReadTrace: TraceRead => TracePiece;
-    /// Forgets a muscle's remembered history; only while every muscle is vented.
+    /// Forgets a muscle's remembered history; only while disarmed or in a fault, vented.
     25 forget_memory Forget: ForgetMemory => ();
     /// Restarts the device after this answer; only while disarmed or in a fault, vented.
     26 restart Restart: () => ();
@@ -193,15 +193,15 @@ endpoints! {
     30 board_settings GetBoardSettings: () => Settings;
     /// What is in the two slots for firmware; refused where a board has none, or the firmware has no key.
     31 update GetUpdate: () => UpdateStatus;
-    /// Begins an installation of another firmware; only while every muscle is vented.
+    /// Begins an installation of another firmware; only while disarmed or in a fault, vented.
     32 update_begin BeginUpdate: UpdateBegin => UpdateStatus;
-    /// The next piece of the program; the answer is how many bytes are there. Only while every muscle is vented.
+    /// The next piece of the program; the answer is how many bytes are there. Only while disarmed or in a fault, vented.
     33 update_piece SendUpdatePiece: UpdatePiece => u32;
-    /// Checks the whole program and makes it the one of the next start; only while every muscle is vented.
+    /// Checks the whole program and makes it the one of the next start; only while disarmed or in a fault, vented.
     34 update_commit CommitUpdate: () => UpdateStatus;
-    /// Confirms the program that runs: it stays. Only while every muscle is vented.
+    /// Confirms the program that runs: it stays. Only while disarmed or in a fault, vented.
     35 update_confirm ConfirmUpdate: () => UpdateStatus;
-    /// Makes the other program the one of the next start; only while every muscle is vented.
+    /// Makes the other program the one of the next start; only while disarmed or in a fault, vented.
     36 update_revert RevertUpdate: () => UpdateStatus;
 }
 

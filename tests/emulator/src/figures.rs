@@ -123,7 +123,9 @@ pub fn markdown(figures: &[Figure]) -> String {
     let mut out = String::from(
         "# Figures of the controller\n\nWritten by `cargo run -p emulator-tests --bin figures`.\n\n## Instructions\n\nOn the \
          emulated Cortex-M4F (QEMU, `-icount shift=0`); table of six pressures and order 4. The inverse starts 5 kPa away. An \
-         effect's figure is what it adds to a tick on top of the context, which all effects of a table share.\n\n| what | mean | \
+         effect's figure is what it adds to a tick on top of the context, which all effects of a table share. `health-of-step` is the \
+         part of the step that compares the load cell with the table: the difference from a step whose samples are not compared, in the \
+         mean and in the worst tick, and the countdown to a sample.\n\n| what | mean | \
          worst | points |\n| --- | --- | --- | --- |\n",
     );
     for figure in figures {

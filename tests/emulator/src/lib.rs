@@ -17,6 +17,7 @@ pub mod follower;
 pub mod joint;
 pub mod line;
 pub mod machine;
+pub mod misjudged;
 pub mod pair;
 pub mod patience;
 pub mod program;

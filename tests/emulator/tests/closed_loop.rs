@@ -281,3 +281,22 @@ fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does
         assert!(error < 0.5, "{error} % with moduli by {factor}");
     }
 }
+
+/// The whole table is `cargo run --release -p emulator-tests --bin tracking`.
+#[test]
+fn no_number_of_a_table_that_is_wrong_by_a_fifth_makes_the_loop_swing() {
+    use emulator_tests::misjudged;
+    use emulator_tests::sweep::{Course, Law, Load, Subject};
+    let subject = Subject::of(presets::miniature());
+    let corners = misjudged::alone(&subject, 0.2).into_iter().chain(misjudged::worst(&subject, 0.2));
+    for corner in corners {
+        let other = corner.subject(&subject);
+        let error = other.error(Mode::Force, Load::Moved, Course::Sine(1.0), Law::Trimmed);
+        let still = other.still(Load::AtStroke, Law::Trimmed);
+        eprintln!("{}: {:.2}, {error:.2} %, {still:.3?}", corner.name(), corner.slope_error);
+        // The small-gain theorem.
+        assert!(corner.slope_error < 1.0, "{}: {}", corner.name(), corner.slope_error);
+        assert!(error < 0.5, "{}: {error} %", corner.name());
+        assert!(still.error < 0.7 && still.swing < 0.1 && still.jump < 4e3, "{}: {still:?}", corner.name());
+    }
+}

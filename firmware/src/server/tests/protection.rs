@@ -96,6 +96,39 @@ fn no_firmware_is_taken_while_a_mode_runs() {
 }
 
 #[test]
+fn nothing_that_changes_an_armed_device_is_done() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    for deadband_kpa in [40.0, 50.0] {
+        assert!(send(&mut server, &shared, &image(deadband_kpa)).is_ok());
+    }
+    let before = (info(&mut server), deadband_in_use(&shared));
+    let generation = before.0.expect("a table").generation;
+    server.take_updates(std::boxed::Box::new(Untouched));
+    pass(&shared, 10, &mut 0.0);
+    assert_eq!(shared.with(|c| c.arm(OWNER)), Ok(()));
+    let no = Refusal::WrongState(State::Armed);
+    assert_eq!(send(&mut server, &shared, &image(60.0)), Err(no), "commit");
+    let side = Side::Agonist;
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    let back = RollBack { side, generation };
+    assert_eq!(answers.table_rollback(&back, &mut TableInfo::default()), Err(no), "roll back");
+    let mut settings = Settings::default();
+    settings.limits.force_n *= 0.5;
+    assert_eq!(answers.set_settings(&settings, &mut Settings::default()), Err(no), "settings");
+    assert_eq!(answers.forget_memory(&ForgetMemory { side }, &mut ()), Err(no), "memories");
+    let mut status = UpdateStatus::default();
+    assert_eq!(answers.update_begin(&UpdateBegin::default(), &mut status), Err(no), "update");
+    assert_eq!(answers.update_commit(&(), &mut status), Err(no), "commit of an update");
+    assert_eq!(shared.with(|c| *c.settings()), Settings::default());
+    assert_eq!((info(&mut server), deadband_in_use(&shared)), before);
+    assert_eq!(shared.with(Controller::disarm), Ok(()));
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.set_settings(&settings, &mut Settings::default()), Ok(()));
+    assert_eq!(shared.with(|c| *c.settings()), settings);
+}
+
+#[test]
 fn an_armed_device_is_not_restarted() {
     let shared = Shared::new(Settings::default());
     let mut server = started(MockFlash::erased(), &shared);

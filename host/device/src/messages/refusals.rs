@@ -25,7 +25,8 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
             match now {
                 State::Disarmed if request == ClearFault::NAME => "there is no fault to clear".to_owned(),
                 State::Disarmed => "arm it first".to_owned(),
-                State::Armed | State::Running => "stop it first: host vent --port PORT".to_owned(),
+                State::Armed => "disarm it first: host vent --port PORT".to_owned(),
+                State::Running => "stop it first: host vent --port PORT".to_owned(),
                 State::Fault => "see `host device faults`, then clear it with --clear".to_owned(),
             },
         ),
