@@ -14,9 +14,9 @@
 use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdict, WhyNot, size};
 use super::contrast::log_mean;
 use super::criteria::{
-    FAST_SHARE, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP, LOSS_CLIP, LOSS_FLOOR,
-    LOSS_PRESSURE, LOSS_RESTS, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES, LOSS_SPREAD, NAMED,
-    PRIOR_UNKNOWN, SET,
+    CATALOGUE_LAW_ERROR, FAST_SHARE, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP,
+    LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES,
+    LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
 };
 use super::motion;
 use super::runs::{Run, Runs};
@@ -221,7 +221,13 @@ pub(super) fn add(report: &mut ChangeReport, loss: &Loss, none: f64) {
         class_probability: probability,
         class: about.changed.class,
         share_explained: loss.unseen,
-        parameters: vec![size(("loss_rate", "1/s"), loss.change, loss.std, loss.freedom, 0.0)],
+        parameters: vec![size(
+            ("loss_rate", "1/s"),
+            loss.change,
+            loss.std,
+            loss.freedom,
+            CATALOGUE_LAW_ERROR,
+        )],
         confusable_with: Vec::new(),
         since: Since::NotDetermined,
         owner: about.changed.owner,
