@@ -8,11 +8,12 @@ use super::cells::{Want, Words};
 use super::column_plan::{ColumnPlan, Role};
 use super::columns::Recording;
 use super::decimal;
-use super::import::{FoundZero, Import, Value, Zero};
+use super::import::{FoundZero, Import, NewRun, Value, Zero};
 use super::plausibility::check;
 use super::quantity::Quantity;
 use super::stroke_zero::{at_largest, first_level, smallest};
-use crate::date::time_stamp;
+use super::time_of_day;
+use crate::date::time_stamp_in;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -76,10 +77,17 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
     }
     set_zero(job, &mut table);
     let keep = keep(job, &table, rows.rows)?;
+    let mut names = job.import.split_by.clone();
+    if job.import.new_run == Some(NewRun::Clock)
+        && let Some(time) = table.quantities.get(&Quantity::Time)
+    {
+        names.push("run".to_owned());
+        table.splits.push(runs_of_clock(time));
+    }
     let groups = groups(&table.splits, keep.as_deref(), rows.rows);
     let mut recordings = Vec::with_capacity(groups.len());
     for (labels, group) in groups {
-        let mut recording = take(job, &mut table, group, &labels)?;
+        let mut recording = take(job, &mut table, group, &names, &labels)?;
         recording.labels.extend(job.labels.iter().cloned());
         check(&recording, &map)?;
         recordings.push(recording);
@@ -102,7 +110,11 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
         let words = std::mem::take(&mut rows.texts[i]);
         match role {
             Role::Quantity(q) => {
-                table.quantities.insert(*q, std::mem::take(&mut rows.numbers[i]));
+                let mut values = std::mem::take(&mut rows.numbers[i]);
+                if let Want::Stamp { scale, offset, .. } = plan.wanted[i].want {
+                    time_of_day::past_midnight(&mut values, scale, offset);
+                }
+                table.quantities.insert(*q, values);
             }
             Role::Coded(q, values) => {
                 let name = &job.names[plan.wanted[i].index];
@@ -219,8 +231,8 @@ fn look_up(
                     .file(&described.file)
                     .value(cell(line))
             }),
-            (Want::Stamp { scale, offset }, _) => {
-                time_stamp(&cell(line)).map(|v| v * scale + offset).ok_or_else(|| {
+            (Want::Stamp { scale, offset, order }, _) => {
+                time_stamp_in(&cell(line), order).map(|v| v * scale + offset).ok_or_else(|| {
                     Error::new(DataCode::RecordingNotANumber, "not a time stamp in the lookup table")
                         .file(&described.file)
                         .column(name)
@@ -339,6 +351,21 @@ fn needs_rest_length(what: &str) -> Error {
         .help("give the muscle's description (--muscle) or its table (--table)")
 }
 
+/// The run of each row, counted from 1: one begins where the clock goes back.
+fn runs_of_clock(time: &[f64]) -> Words {
+    let mut runs = Words::default();
+    let mut run = 1_usize;
+    let mut word = run.to_string();
+    for (row, now) in time.iter().enumerate() {
+        if row > 0 && *now < time[row - 1] {
+            run += 1;
+            word = run.to_string();
+        }
+        runs.push(&word);
+    }
+    runs
+}
+
 type Group = (Vec<String>, Option<Vec<u32>>);
 
 /// The rows of each recording, in the order of first appearance; `None` when a recording is the whole file.
@@ -365,7 +392,13 @@ fn groups(splits: &[Words], keep: Option<&[bool]>, rows: usize) -> Vec<Group> {
     groups.into_iter().map(|(labels, rows)| (labels, Some(rows))).collect()
 }
 
-fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[String]) -> Result<Recording> {
+fn take(
+    job: &Job<'_>,
+    table: &mut Table,
+    rows: Option<Vec<u32>>,
+    names: &[String],
+    labels: &[String],
+) -> Result<Recording> {
     let mut column = |quantity: Quantity| match &rows {
         // The whole file: its columns move over without a copy.
         None => table.quantities.remove(&quantity),
@@ -403,7 +436,7 @@ fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[Stri
         _ => {}
     }
     let stem = job.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let labels: Vec<_> = job.import.split_by.iter().cloned().zip(labels.iter().cloned()).collect();
+    let labels: Vec<_> = names.iter().cloned().zip(labels.iter().cloned()).collect();
     let name = if labels.is_empty() {
         stem
     } else {

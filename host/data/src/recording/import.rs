@@ -5,6 +5,7 @@
 //! header = false                    # then columns are named by their number, from 1
 //! delimiter = "tab"                 # "comma", "tab", "semicolon", "space" (runs of blanks) or one character
 //! comment = "#"                     # lines that begin so are skipped
+//! thousands = "."                   # what separates thousands: "," "." " " or "'"; nothing unless said otherwise
 //! decimal = "comma"                 # how decimals are written; "point" unless said otherwise
 //! missing = "skip"                  # leave out rows with empty cells or NaN; "error" unless said otherwise
 //! sheet = "Run 1"                   # of a workbook; the only one with contents unless said otherwise
@@ -12,10 +13,11 @@
 //! file_name = '(?<pressure_kPa>[0-9.]+)kPa'   # regular expression; what its named groups catch is constant per file
 //! preamble = 'pressure: (?<pressure_psi>[0-9.]+)' # the same for the skipped lines
 //! split_by = ["run"]                # one recording per value
+//! new_run = "clock"                 # a recording begins where the time goes back
 //!
 //! [columns.displacement]            # time, pressure, displacement, length, contraction, force, temperature,
 //! column = 2                        # pressure_command, cycle, direction, rest_length
-//! unit = "in"                       # of a time also "timestamp": 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25
+//! unit = "in"                       # of a time also "timestamp", "timestamp-month-first", "timestamp-day-first": 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25
 //! scale = 1.0                       # value in `unit` = cell · scale + offset
 //! offset = 0.0
 //! positive = "extension"            # or "contraction"
@@ -37,6 +39,10 @@
 //! file = "runs.csv"
 //! match = { file = "{file}", run = "run" }   # column of the table = column of the file
 //!
+//! [side_by_side]                    # recordings beside each other, with columns by number
+//! recordings = 2
+//! columns = 5                       # columns from one to the next
+//!
 //! [grid]                            # a static map: a row for each pressure, a column of force for each length
 //! columns = 'F_(?<length_mm>[0-9.]+)mm'  # headings of its columns; what the named groups catch goes with the column
 //! values = "force_N"                # what its cells are
@@ -51,6 +57,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::quantity::{Quantity, Unit};
+use super::thousands::SEPARATORS;
+use crate::date::DateOrder;
 use crate::error::{DataCode, Error, Result, nearest};
 use crate::file_kind::FileKind;
 use crate::toml_errors::toml_error;
@@ -129,13 +137,23 @@ pub struct Column {
     pub values: Option<BTreeMap<String, f64>>,
 }
 
-/// The unit of a time that is written as a date with a time of day, or as a time of day alone.
-pub(super) const TIME_STAMP: &str = "timestamp";
+/// The units of a time that is written as a date with a time of day, or as a time of day alone, and how dates with slashes are read.
+const TIME_STAMPS: [(&str, DateOrder); 3] = [
+    ("timestamp", DateOrder::YearFirst),
+    ("timestamp-month-first", DateOrder::MonthFirst),
+    ("timestamp-day-first", DateOrder::DayFirst),
+];
+
+/// The unit of time stamps with dates of this order.
+pub(super) fn time_stamp_unit(order: DateOrder) -> &'static str {
+    TIME_STAMPS.iter().find(|(_, o)| *o == order).map_or(TIME_STAMPS[0].0, |(unit, _)| unit)
+}
 
 impl Column {
-    /// Whether its cells are time stamps.
-    pub(super) fn is_stamp(&self, quantity: Quantity) -> bool {
-        quantity == Quantity::Time && self.unit.as_deref() == Some(TIME_STAMP)
+    /// How its cells are read, where they are time stamps.
+    pub(super) fn stamp(&self, quantity: Quantity) -> Option<DateOrder> {
+        let found = TIME_STAMPS.iter().find(|(unit, _)| self.unit.as_deref() == Some(unit));
+        found.filter(|_| quantity == Quantity::Time).map(|(_, order)| *order)
     }
 }
 
@@ -162,6 +180,24 @@ pub struct Grid {
     pub columns: String,
     /// What its cells are: a name with its unit.
     pub values: String,
+}
+
+/// Where a recording begins, beside a change of the columns in `split_by`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum NewRun {
+    /// Where the time goes back.
+    Clock,
+}
+
+/// Recordings beside each other in one table, with the same columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SideBySide {
+    /// How many there are.
+    pub recordings: usize,
+    /// Columns from one to the next.
+    pub columns: usize,
 }
 
 /// How decimals are written.
@@ -240,6 +276,9 @@ impl Value {
     }
 }
 
+/// Recordings side by side, at most: each is read on its own.
+const MOST_BESIDE: usize = 1000;
+
 /// An import description.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -258,6 +297,8 @@ pub struct Import {
     /// How decimals are written.
     #[serde(default)]
     pub decimal: Decimal,
+    /// What separates thousands: `,`, `.`, a blank or an apostrophe; nothing by default.
+    pub thousands: Option<char>,
     /// What becomes of rows with empty cells, NaN or `---` in a column that is used.
     #[serde(default)]
     pub missing: Missing,
@@ -272,6 +313,10 @@ pub struct Import {
     /// Columns whose values set recordings apart.
     #[serde(default)]
     pub split_by: Vec<String>,
+    /// Where a recording begins beside that.
+    pub new_run: Option<NewRun>,
+    /// Recordings beside each other.
+    pub side_by_side: Option<SideBySide>,
     /// By quantity.
     #[serde(default)]
     pub columns: BTreeMap<String, Column>,
@@ -322,7 +367,7 @@ impl Import {
             }
             if let Some(unit) = &column.unit
                 && quantity.unit(unit).is_none()
-                && !column.is_stamp(quantity)
+                && column.stamp(quantity).is_none()
             {
                 return Err(invalid(format!("{name} has no unit `{unit}`"))
                     .column(name)
@@ -354,7 +399,46 @@ impl Import {
         pattern("preamble", self.preamble.as_deref())?;
         pattern("grid.columns", self.grid.as_ref().map(|g| g.columns.as_str()))?;
         self.delimiter()?;
+        self.thousands()?;
+        self.check_side_by_side()
+    }
+
+    fn check_side_by_side(&self) -> Result<()> {
+        let Some(SideBySide { recordings, columns }) = self.side_by_side else { return Ok(()) };
+        let invalid = |cause: &str| Err(Error::new(DataCode::ImportInvalid, cause).column("side_by_side"));
+        if !(2..=MOST_BESIDE).contains(&recordings) || columns == 0 {
+            return invalid("recordings must be from 2 to 1000, and columns 1 or more");
+        }
+        if self.columns.values().any(|c| matches!(c.column, ColumnRef::Name(_))) || !self.split_by.is_empty()
+        {
+            return invalid("recordings side by side need all columns by their numbers, and no split_by");
+        }
         Ok(())
+    }
+
+    /// What separates thousands.
+    pub(super) fn thousands(&self) -> Result<Option<u8>> {
+        let Some(separator) = self.thousands else { return Ok(None) };
+        let decimal = if self.decimal == Decimal::Comma { ',' } else { '.' };
+        let known = SEPARATORS.iter().find(|s| char::from(**s) == separator && separator != decimal);
+        known.map(|s| Some(*s)).ok_or_else(|| {
+            Error::new(DataCode::ImportInvalid, "this cannot separate thousands")
+                .column("thousands")
+                .value(separator.to_string())
+                .help("use \",\", \".\", \" \" or \"'\", and not the decimal sign")
+        })
+    }
+
+    /// The description of the n-th of recordings side by side, counted from 0.
+    pub(super) fn beside(&self, n: usize) -> Self {
+        let step = self.side_by_side.map_or(0, |s| s.columns);
+        let mut own = Self { side_by_side: None, ..self.clone() };
+        for column in own.columns.values_mut() {
+            if let ColumnRef::Number(number) = &mut column.column {
+                *number += n * step;
+            }
+        }
+        own
     }
 
     pub(super) fn delimiter(&self) -> Result<Option<u8>> {
