@@ -50,116 +50,25 @@
 //!
 //! A quantity that is not described is looked for in the header under its usual name.
 
+mod column;
+mod side_by_side;
+mod value;
+
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
 use serde::Deserialize;
 
 use super::quantity::{Quantity, Unit};
 use super::thousands::SEPARATORS;
-use crate::date::DateOrder;
 use crate::error::{DataCode, Error, Result, nearest};
 use crate::file_kind::FileKind;
 use crate::toml_errors::toml_error;
 
-/// A column by name or by number, counted from 1.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
-pub enum ColumnRef {
-    /// Counted from 1.
-    Number(usize),
-    /// As the header has it.
-    Name(String),
-}
-
-impl fmt::Display for ColumnRef {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(number) => write!(f, "{number}"),
-            Self::Name(name) => write!(f, "{name}"),
-        }
-    }
-}
-
-/// Which way a displacement counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Positive {
-    /// Readings grow as the muscle gets longer.
-    Extension,
-    /// Readings grow as the muscle shortens.
-    Contraction,
-}
-
-/// Where a displacement of arbitrary zero has stroke 0, that is, where the muscle has its rest length.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum Zero {
-    /// At a reading, in the column's unit after scale and offset, before the sign.
-    At(f64),
-    /// At a place that the data show.
-    Found(FoundZero),
-}
-
-/// A zero that the data show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FoundZero {
-    /// Where the file begins.
-    First,
-    /// Where the muscle is longest, as on a machine that never stretches it beyond rest.
-    Longest,
-    /// Where the force is largest: the blocked force, at rest length.
-    LargestForce,
-}
-
-/// What one quantity is made from.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Column {
-    /// The column of the file or of the lookup table.
-    pub column: ColumnRef,
-    /// The unit after scale and offset; by default that of the column's name, or SI. `timestamp` for a time that is written as a date
-    /// with a time of day.
-    pub unit: Option<String>,
-    /// Value in `unit` = cell · scale + offset.
-    #[serde(default = "one")]
-    pub scale: f64,
-    /// See `scale`.
-    #[serde(default)]
-    pub offset: f64,
-    /// For displacements: which way is positive; contraction by default.
-    pub positive: Option<Positive>,
-    /// For displacements: where stroke 0 is; where the reading is 0 by default.
-    pub zero: Option<Zero>,
-    /// Text to number, for columns of words.
-    pub values: Option<BTreeMap<String, f64>>,
-}
-
-/// The units of a time that is written as a date with a time of day, or as a time of day alone, and how dates with slashes are read.
-const TIME_STAMPS: [(&str, DateOrder); 3] = [
-    ("timestamp", DateOrder::YearFirst),
-    ("timestamp-month-first", DateOrder::MonthFirst),
-    ("timestamp-day-first", DateOrder::DayFirst),
-];
-
-/// The unit of time stamps with dates of this order.
-pub(super) fn time_stamp_unit(order: DateOrder) -> &'static str {
-    TIME_STAMPS.iter().find(|(_, o)| *o == order).map_or(TIME_STAMPS[0].0, |(unit, _)| unit)
-}
-
-impl Column {
-    /// How its cells are read, where they are time stamps.
-    pub(super) fn stamp(&self, quantity: Quantity) -> Option<DateOrder> {
-        let found = TIME_STAMPS.iter().find(|(unit, _)| self.unit.as_deref() == Some(unit));
-        found.filter(|_| quantity == Quantity::Time).map(|(_, order)| *order)
-    }
-}
-
-fn one() -> f64 {
-    1.0
-}
+pub(super) use column::time_stamp_unit;
+pub use column::{Column, ColumnRef, FoundZero, Positive, Zero};
+pub use side_by_side::SideBySide;
+pub use value::Value;
 
 /// A table beside the recording, such as a list of runs with their geometry.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -190,16 +99,6 @@ pub enum NewRun {
     Clock,
 }
 
-/// Recordings beside each other in one table, with the same columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SideBySide {
-    /// How many there are.
-    pub recordings: usize,
-    /// Columns from one to the next.
-    pub columns: usize,
-}
-
 /// How decimals are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -221,63 +120,6 @@ pub enum Missing {
     /// The row is left out, and counted.
     Skip,
 }
-
-/// A text or a number to compare cells with.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum Value {
-    /// A number; cells are compared as numbers.
-    Number(f64),
-    /// A text, or `{rest_length_mm}` or `{name}` of the muscle.
-    Text(String),
-    /// One of these.
-    AnyOf(Vec<Value>),
-    /// Everything but this.
-    Not {
-        /// What is excluded.
-        not: Box<Value>,
-    },
-}
-
-impl Value {
-    /// A filter of the command line, `COLUMN=VALUE`: the column and the value. `COLUMN!=VALUE` excludes, and `COLUMN=A,B` takes several;
-    /// a cell that holds the whole text with its commas passes, too.
-    ///
-    /// ```
-    /// use pam_data::recording::import::Value;
-    /// let text = |t: &str| Value::Text(t.to_owned());
-    /// assert_eq!(Value::of_option("run", "8"), ("run".to_owned(), text("8")));
-    /// let several = Value::AnyOf(vec![text("8,9"), text("8"), text("9")]);
-    /// assert_eq!(Value::of_option("run!", "8,9"), ("run".to_owned(), Value::Not { not: Box::new(several) }));
-    /// ```
-    #[must_use]
-    pub fn of_option(column: &str, text: &str) -> (String, Self) {
-        let whole = Self::Text(text.to_owned());
-        let value = if text.contains(',') {
-            let parts = text.split(',').map(|part| Self::Text(part.trim().to_owned()));
-            Self::AnyOf(std::iter::once(whole).chain(parts).collect())
-        } else {
-            whole
-        };
-        match column.strip_suffix('!') {
-            Some(column) => (column.trim_end().to_owned(), Self::Not { not: Box::new(value) }),
-            None => (column.to_owned(), value),
-        }
-    }
-
-    /// Whether it depends on the muscle's rest length.
-    pub(super) fn is_of_length(&self) -> bool {
-        match self {
-            Self::Text(text) => text == "{rest_length_mm}",
-            Self::Number(_) => false,
-            Self::AnyOf(values) => values.iter().any(Self::is_of_length),
-            Self::Not { not } => not.is_of_length(),
-        }
-    }
-}
-
-/// Recordings side by side, at most: each is read on its own.
-const MOST_BESIDE: usize = 1000;
 
 /// An import description.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -403,19 +245,6 @@ impl Import {
         self.check_side_by_side()
     }
 
-    fn check_side_by_side(&self) -> Result<()> {
-        let Some(SideBySide { recordings, columns }) = self.side_by_side else { return Ok(()) };
-        let invalid = |cause: &str| Err(Error::new(DataCode::ImportInvalid, cause).column("side_by_side"));
-        if !(2..=MOST_BESIDE).contains(&recordings) || columns == 0 {
-            return invalid("recordings must be from 2 to 1000, and columns 1 or more");
-        }
-        if self.columns.values().any(|c| matches!(c.column, ColumnRef::Name(_))) || !self.split_by.is_empty()
-        {
-            return invalid("recordings side by side need all columns by their numbers, and no split_by");
-        }
-        Ok(())
-    }
-
     /// What separates thousands.
     pub(super) fn thousands(&self) -> Result<Option<u8>> {
         let Some(separator) = self.thousands else { return Ok(None) };
@@ -427,18 +256,6 @@ impl Import {
                 .value(separator.to_string())
                 .help("use \",\", \".\", \" \" or \"'\", and not the decimal sign")
         })
-    }
-
-    /// The description of the n-th of recordings side by side, counted from 0.
-    pub(super) fn beside(&self, n: usize) -> Self {
-        let step = self.side_by_side.map_or(0, |s| s.columns);
-        let mut own = Self { side_by_side: None, ..self.clone() };
-        for column in own.columns.values_mut() {
-            if let ColumnRef::Number(number) = &mut column.column {
-                *number += n * step;
-            }
-        }
-        own
     }
 
     pub(super) fn delimiter(&self) -> Result<Option<u8>> {
