@@ -108,7 +108,6 @@ fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, 
             seconds?.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         Some(range.1 - range.0)
     };
-    let marked = first.to_ascii_lowercase().ends_with('m');
     let (order, reason) = match (span(DateOrder::MonthFirst), span(DateOrder::DayFirst)) {
         (Some(_), None) => (DateOrder::MonthFirst, "no other order gives dates"),
         (None, Some(_)) => (DateOrder::DayFirst, "no other order gives dates"),
@@ -118,7 +117,6 @@ fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, 
         (Some(month), Some(day)) if day * TELLING < month => {
             (DateOrder::DayFirst, "otherwise months would pass between the rows")
         }
-        (Some(_), Some(_)) if marked => (DateOrder::MonthFirst, "the times have AM and PM"),
         (Some(_), Some(_)) => {
             found.unknown.push(format!(
                 "{} holds dates such as `{first}`, whose month may be the first or the second number: describe it under [columns.time] with \
