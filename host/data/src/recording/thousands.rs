@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// A separator as an import description names it; a blank stands for those that do not break, an apostrophe for the typographic one.
+/// A separator as an import description names it; a blank includes those that do not break, an apostrophe the typographic one.
 pub(super) const SEPARATORS: [u8; 4] = *b",. '";
 
 /// Whether a character is this separator.

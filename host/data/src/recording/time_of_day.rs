@@ -6,7 +6,7 @@ const DAY: f64 = 86_400.0;
 const STEP: f64 = 3600.0;
 
 /// Adds a day to times of day wherever they pass midnight, s = seconds · scale + offset; gives the rows at which they do. Dates are no times
-/// of day, and a longer step back is none of a clock that goes on: both stay as they are.
+/// of day, and a longer step back is none of a clock that continues: both stay as they are.
 pub(super) fn past_midnight(times: &mut [f64], scale: f64, offset: f64) -> Vec<usize> {
     let of_day = |t: &f64| (0.0..DAY).contains(&((t - offset) / scale)) || t.is_nan();
     if !times.iter().all(of_day) {

@@ -1,4 +1,4 @@
-//! How a file writes what is no plain number: remarks, separators of thousands, dates with slashes.
+//! Forms of a file: signs of remarks, separators of thousands, dates with slashes.
 
 use super::layout::{Layout, cells, is_missing, number};
 use super::sample::SampleColumn;
