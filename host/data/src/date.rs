@@ -83,6 +83,24 @@ pub fn in_text(text: &str) -> Option<f64> {
 /// ```
 #[must_use]
 pub fn time_stamp(text: &str) -> Option<f64> {
+    time_stamp_in(text, DateOrder::YearFirst)
+}
+
+/// How dates with slashes are read that do not begin with the year.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DateOrder {
+    /// They are not.
+    #[default]
+    YearFirst,
+    /// `11/21/2026`, also `11/21/26`.
+    MonthFirst,
+    /// `21/11/2026`, also `21/11/26`.
+    DayFirst,
+}
+
+/// As [`time_stamp`], also of dates with slashes in this order.
+#[must_use]
+pub fn time_stamp_in(text: &str, order: DateOrder) -> Option<f64> {
     let text = text.trim().as_bytes();
     let iso = |text| {
         let (year, rest) = number(text, 4)?;
@@ -96,7 +114,20 @@ pub fn time_stamp(text: &str) -> Option<f64> {
         let (year, rest) = number(rest.strip_prefix(b".")?, 4)?;
         Some((year, month, day, rest))
     };
-    let Some((year, month, day, rest)) = iso(text).or_else(|| german(text)) else {
+    let slashes = |text| {
+        let (first, rest) = short(text)?;
+        let (second, rest) = short(rest.strip_prefix(b"/")?)?;
+        let rest = rest.strip_prefix(b"/")?;
+        let century = |(year, rest)| (2000 + year, rest);
+        let (year, rest) = number(rest, 4).or_else(|| number(rest, 2).map(century))?;
+        match order {
+            DateOrder::YearFirst => None,
+            DateOrder::MonthFirst => Some((year, first, second, rest)),
+            DateOrder::DayFirst => Some((year, second, first, rest)),
+        }
+    };
+    let dated = iso(text).or_else(|| german(text)).or_else(|| slashes(text));
+    let Some((year, month, day, rest)) = dated else {
         // `05:30` alone may be minutes and seconds.
         let whole = text.iter().filter(|b| **b == b':').count() == 2;
         return time_with_parts(text)

@@ -36,6 +36,8 @@ pub mod sensor_faults;
 mod source;
 mod stroke_zero;
 mod tdms;
+mod thousands;
+mod time_of_day;
 mod unit_check;
 #[cfg(feature = "excel")]
 mod workbook;

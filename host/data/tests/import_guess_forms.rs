@@ -106,12 +106,12 @@ fn a_line_above_the_table_is_taken_only_for_the_muscles_own_pressure() {
 
 #[test]
 fn cells_that_are_no_numbers_are_told_and_nothing_replaces_their_column() {
-    let rows = stroke(|[t, p, x, f]| format!("{t:.2}\t\"{p:.0},000.0\"\t{x:.3}\t{f:.3}"));
+    let rows = stroke(|[t, p, x, f]| format!("{t:.2}\t\"{p:.0},000\"\t{x:.3}\t{f:.3}"));
     let (guess, recordings) =
         read(&[("a_200kPa.txt", format!("t (s)\tp (Pa)\tx (mm)\tF (N)\n{rows}").into())]);
     let unknown = guess.unknown.join("; ");
     assert!(
-        unknown.contains("p (Pa) looks like pressure") && unknown.contains("separators of thousands"),
+        unknown.contains("p (Pa) holds numbers such as") && unknown.contains("separators of thousands"),
         "{unknown}"
     );
     assert!(recordings.is_err() && guess.patterns.is_empty());
@@ -243,8 +243,8 @@ fn what_a_file_lacks_is_told_with_the_right_remedy() {
     let wraps = told(format!("micros,pressure_kPa,displacement_mm,force_N\n{rows}"));
     assert!(wraps.contains("a counter of 32 bits began again behind row 20"), "{wraps}");
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},{x:.3},{f:.3},{:.2},{p},{x:.3},{f:.3}", t + 0.3));
-    let two = told(format!("Time_1,Press_1,Ext_1,Load_1,Time_2,Press_2,Ext_2,Load_2\n{rows}"));
-    assert!(two.contains("side by side"), "{two}");
+    let two = format!("Time_1,Press_1,Ext_1,Load_1,Time_2,Press_2,Ext_2,Load_2\n{rows}");
+    assert_eq!(read(&[("a.csv", two.into())]).0.side_by_side, Some((2, 4)));
 }
 
 #[test]

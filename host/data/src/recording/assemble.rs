@@ -1,5 +1,7 @@
 //! From the columns of a file to recordings: filters, groups, stroke, and the checks that need whole columns.
 
+mod look_up;
+
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -8,11 +10,11 @@ use super::cells::{Want, Words};
 use super::column_plan::{ColumnPlan, Role};
 use super::columns::Recording;
 use super::decimal;
-use super::import::{FoundZero, Import, Value, Zero};
+use super::import::{FoundZero, Import, NewRun, Value, Zero};
 use super::plausibility::check;
 use super::quantity::Quantity;
 use super::stroke_zero::{at_largest, first_level, smallest};
-use crate::date::time_stamp;
+use super::time_of_day;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -76,10 +78,17 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
     }
     set_zero(job, &mut table);
     let keep = keep(job, &table, rows.rows)?;
+    let mut names = job.import.split_by.clone();
+    if job.import.new_run == Some(NewRun::Clock)
+        && let Some(time) = table.quantities.get(&Quantity::Time)
+    {
+        names.push("run".to_owned());
+        table.splits.push(runs_of_clock(time));
+    }
     let groups = groups(&table.splits, keep.as_deref(), rows.rows);
     let mut recordings = Vec::with_capacity(groups.len());
     for (labels, group) in groups {
-        let mut recording = take(job, &mut table, group, &labels)?;
+        let mut recording = take(job, &mut table, group, &names, &labels)?;
         recording.labels.extend(job.labels.iter().cloned());
         check(&recording, &map)?;
         recordings.push(recording);
@@ -102,7 +111,11 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
         let words = std::mem::take(&mut rows.texts[i]);
         match role {
             Role::Quantity(q) => {
-                table.quantities.insert(*q, std::mem::take(&mut rows.numbers[i]));
+                let mut values = std::mem::take(&mut rows.numbers[i]);
+                if let Want::Stamp { scale, offset, .. } = plan.wanted[i].want {
+                    time_of_day::past_midnight(&mut values, scale, offset);
+                }
+                table.quantities.insert(*q, values);
             }
             Role::Coded(q, values) => {
                 let name = &job.names[plan.wanted[i].index];
@@ -132,7 +145,7 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
     if !plan.looked_up.is_empty()
         && let Some(lookup) = job.lookup
     {
-        look_up(job, rows, &mut table, &keys, lookup)?;
+        look_up::look_up(job, rows, &mut table, &keys, lookup)?;
     }
     Ok(table)
 }
@@ -152,93 +165,6 @@ fn is_called(name: &str, word: &str) -> bool {
 
 fn number(text: &str) -> Option<f64> {
     decimal::prefix(text.as_bytes()).and_then(|(v, used)| (used == text.len()).then_some(v))
-}
-
-fn look_up(
-    job: &Job<'_>,
-    rows: &Rows,
-    table: &mut Table,
-    keys: &HashMap<usize, Words>,
-    lookup: &LookupTable,
-) -> Result<()> {
-    let Some(described) = &job.import.lookup else { return Ok(()) };
-    let file = job.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut columns = Vec::new();
-    for (n, theirs) in described.keys.keys().enumerate() {
-        let index = lookup.header.iter().position(|h| h == theirs).ok_or_else(|| {
-            Error::new(DataCode::ImportInvalid, format!("the lookup table has no column `{theirs}`"))
-                .file(&described.file)
-                .help(format!("it has {}", lookup.header.join(", ")))
-        })?;
-        columns.push((index, keys.get(&n)));
-    }
-    let find = |row: usize| {
-        let wanted: Vec<&str> =
-            columns.iter().map(|(_, words)| words.map_or(file.as_str(), |w| w.get(row))).collect();
-        let fits = |line: &&Vec<String>| {
-            columns
-                .iter()
-                .zip(&wanted)
-                .all(|((i, _), want)| line.get(*i).is_some_and(|have| same(have, want)))
-        };
-        lookup.rows.iter().find(fits).ok_or_else(|| {
-            Error::new(
-                DataCode::ImportInvalid,
-                format!("{} has no line for {}", described.file, wanted.join(", ")),
-            )
-            .line(job.first_line + rows.map.line(row))
-            .help("complete the lookup table, or leave these rows out by [where]")
-        })
-    };
-    let mut last: Option<(Vec<u32>, &Vec<String>)> = None;
-    let mut lines = Vec::with_capacity(rows.rows);
-    for row in 0..rows.rows {
-        let code: Vec<u32> =
-            columns.iter().map(|(_, w)| w.and_then(|w| w.codes.get(row).copied()).unwrap_or(0)).collect();
-        let line = match &last {
-            Some((previous, line)) if *previous == code => *line,
-            _ => find(row)?,
-        };
-        last = Some((code, line));
-        lines.push(line);
-    }
-    for column in &job.plan.looked_up {
-        let name = &lookup.header[column.index];
-        let cell = |line: &Vec<String>| line.get(column.index).cloned().unwrap_or_default();
-        let convert = |line: &&Vec<String>| match (column.want, &column.role) {
-            (Want::Number { scale, offset }, _) => {
-                number(&cell(line)).filter(|v| v.is_finite()).map(|v| v * scale + offset).ok_or_else(|| {
-                    Error::new(DataCode::RecordingNotANumber, "not a number in the lookup table")
-                        .file(&described.file)
-                        .column(name)
-                        .value(cell(line))
-                })
-            }
-            (Want::Text, Role::Coded(_, values)) => values.get(cell(line).trim()).copied().ok_or_else(|| {
-                Error::new(DataCode::RecordingNotANumber, "a word without a value")
-                    .file(&described.file)
-                    .value(cell(line))
-            }),
-            (Want::Stamp { scale, offset }, _) => {
-                time_stamp(&cell(line)).map(|v| v * scale + offset).ok_or_else(|| {
-                    Error::new(DataCode::RecordingNotANumber, "not a time stamp in the lookup table")
-                        .file(&described.file)
-                        .column(name)
-                        .value(cell(line))
-                })
-            }
-            (Want::Text, _) => Ok(0.0),
-        };
-        match &column.role {
-            Role::Quantity(q) | Role::Coded(q, _) => {
-                table.quantities.insert(*q, lines.iter().map(convert).collect::<Result<_>>()?);
-            }
-            Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),
-            Role::Filter(n) => lines.iter().for_each(|l| table.filters[*n].push(&cell(l))),
-            Role::Key(_) => {}
-        }
-    }
-    Ok(())
 }
 
 /// Moves the zero of a displacement to where the muscle has its rest length.
@@ -339,6 +265,21 @@ fn needs_rest_length(what: &str) -> Error {
         .help("give the muscle's description (--muscle) or its table (--table)")
 }
 
+/// The run of each row, counted from 1: one begins where the clock goes back.
+fn runs_of_clock(time: &[f64]) -> Words {
+    let mut runs = Words::default();
+    let mut run = 1_usize;
+    let mut word = run.to_string();
+    for (row, now) in time.iter().enumerate() {
+        if row > 0 && *now < time[row - 1] {
+            run += 1;
+            word = run.to_string();
+        }
+        runs.push(&word);
+    }
+    runs
+}
+
 type Group = (Vec<String>, Option<Vec<u32>>);
 
 /// The rows of each recording, in the order of first appearance; `None` when a recording is the whole file.
@@ -365,7 +306,13 @@ fn groups(splits: &[Words], keep: Option<&[bool]>, rows: usize) -> Vec<Group> {
     groups.into_iter().map(|(labels, rows)| (labels, Some(rows))).collect()
 }
 
-fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[String]) -> Result<Recording> {
+fn take(
+    job: &Job<'_>,
+    table: &mut Table,
+    rows: Option<Vec<u32>>,
+    names: &[String],
+    labels: &[String],
+) -> Result<Recording> {
     let mut column = |quantity: Quantity| match &rows {
         // The whole file: its columns move over without a copy.
         None => table.quantities.remove(&quantity),
@@ -403,7 +350,7 @@ fn take(job: &Job<'_>, table: &mut Table, rows: Option<Vec<u32>>, labels: &[Stri
         _ => {}
     }
     let stem = job.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let labels: Vec<_> = job.import.split_by.iter().cloned().zip(labels.iter().cloned()).collect();
+    let labels: Vec<_> = names.iter().cloned().zip(labels.iter().cloned()).collect();
     let name = if labels.is_empty() {
         stem
     } else {

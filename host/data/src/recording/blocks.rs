@@ -168,12 +168,13 @@ struct Joined {
     failure: Option<RowsError>,
 }
 
-/// Parses everything that is left of `blocks`. `size` is an estimate of the bytes to come.
+/// Parses everything that is left of `blocks`, as [`parse`] does. `size` is an estimate of the bytes to come.
 pub(super) fn read_rows(
     blocks: Blocks,
     dialect: Dialect,
     wanted: &[Wanted],
     width: usize,
+    head: &[Vec<u8>],
     size: Option<u64>,
     budget: Budget,
 ) -> Result<Rows, RowsError> {
@@ -190,7 +191,7 @@ pub(super) fn read_rows(
         failure: None,
     });
     let advanced = Condvar::new();
-    let work = || worker(&queue, &joined, &advanced, workers, dialect, wanted, width, size);
+    let work = || worker(&queue, &joined, &advanced, workers, dialect, wanted, width, head, size);
     if workers == 1 {
         work();
     } else {
@@ -220,6 +221,7 @@ fn worker(
     dialect: Dialect,
     wanted: &[Wanted],
     width: usize,
+    head: &[Vec<u8>],
     size: Option<u64>,
 ) {
     let mut block = Vec::with_capacity(BLOCK + BLOCK / 2);
@@ -246,7 +248,7 @@ fn worker(
                 }
             }
         };
-        let parsed = parse(&block, dialect, wanted, width);
+        let parsed = parse(&block, dialect, wanted, width, head);
         if parsed.is_err() {
             lock(queue).stopped = true;
         }
@@ -294,8 +296,13 @@ mod tests {
     use super::super::cells::{Fault, Want};
     use super::*;
 
-    const DIALECT: Dialect =
-        Dialect { delimiter: b',', comment: Some(b'#'), decimal_comma: false, skip_missing: false };
+    const DIALECT: Dialect = Dialect {
+        delimiter: b',',
+        comment: Some(b'#'),
+        decimal_comma: false,
+        thousands: None,
+        skip_missing: false,
+    };
 
     const VALUES: usize = 1 << 20;
 
@@ -307,6 +314,7 @@ mod tests {
             DIALECT,
             &wanted,
             3,
+            &[],
             size,
             Budget::new(VALUES),
         )
@@ -349,7 +357,7 @@ mod tests {
         let wanted = [Wanted { index: 0, want: number }];
         for size in [None, Some(10)] {
             let blocks = Blocks::new(Box::new(Endless(0)));
-            let found = read_rows(blocks, DIALECT, &wanted, 3, size, Budget::new(VALUES));
+            let found = read_rows(blocks, DIALECT, &wanted, 3, &[], size, Budget::new(VALUES));
             assert!(matches!(found, Err(RowsError::TooMany(_))));
         }
     }

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::decimal;
-use super::line::{Cells, is_blank, trim_end};
-use crate::date::time_stamp;
+use super::line::{Cells, is_blank, is_remark, trim_end};
+use crate::date::{DateOrder, time_stamp_in};
 
 /// How a text file is cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub(super) struct Dialect {
     pub comment: Option<u8>,
     /// Decimals are written with a comma.
     pub decimal_comma: bool,
+    /// What separates thousands.
+    pub thousands: Option<u8>,
     /// Rows with a missing number are left out.
     pub skip_missing: bool,
 }
@@ -25,7 +27,7 @@ pub(super) enum Want {
     /// A number: SI value = number · scale + offset.
     Number { scale: f64, offset: f64 },
     /// A date with a time of day, or a time of day alone: s = its seconds · scale + offset.
-    Stamp { scale: f64, offset: f64 },
+    Stamp { scale: f64, offset: f64, order: DateOrder },
     /// The text itself, from a small vocabulary.
     Text,
 }
@@ -159,9 +161,14 @@ pub(super) fn only_signs(cell: &str) -> bool {
 impl Parsed {
     /// Takes back what was read of a row.
     fn leave_out(&mut self) {
+        self.take_back();
+        self.skipped.push(self.rows);
+    }
+
+    /// As [`Self::leave_out`], of a line that is no row.
+    fn take_back(&mut self) {
         self.numbers.iter_mut().for_each(|n| n.truncate(self.rows));
         self.texts.iter_mut().for_each(|t| t.codes.truncate(self.rows));
-        self.skipped.push(self.rows);
     }
 
     /// Memory that its content takes, in values of 8 bytes: numbers, the codes of texts, every word twice with its place in a table,
@@ -175,12 +182,13 @@ impl Parsed {
     }
 }
 
-/// Parses a block of whole lines; `width` cells are expected in each.
+/// Parses a block of whole lines; `width` cells are expected in each. Lines of `head`, which stood above the rows, may stand among them again.
 pub(super) fn parse(
     block: &[u8],
     dialect: Dialect,
     wanted: &[Wanted],
     width: usize,
+    head: &[Vec<u8>],
 ) -> Result<Parsed, Box<LineError>> {
     let mut out = Parsed {
         numbers: wanted.iter().map(|_| Vec::new()).collect(),
@@ -211,14 +219,15 @@ pub(super) fn parse(
         let line = trim_end(&rest[..end]);
         rest = rest.get(end + 1..).unwrap_or_default();
         // A blank row of a spreadsheet is a line of delimiters.
-        let skip = line.first().is_none_or(|b| Some(*b) == dialect.comment)
-            || line.iter().all(|b| is_blank(*b) || *b == dialect.delimiter);
+        let skip =
+            is_remark(line, dialect.comment) || line.iter().all(|b| is_blank(*b) || *b == dialect.delimiter);
         if !skip {
             match row(line, dialect, wanted, width, &mut out) {
                 Ok(()) => {
                     out.map.note(out.rows, out.lines);
                     out.rows += 1;
                 }
+                Err(_) if head.iter().any(|above| above == line.trim_ascii_end()) => out.take_back(),
                 Err((_, value, fault)) if dialect.skip_missing && fault.is_missing(&value) => out.leave_out(),
                 Err((cell, value, fault)) => {
                     return Err(Box::new(LineError { line: out.lines, cell, value, fault }));
@@ -249,8 +258,10 @@ impl<'a> Quick<'a> {
                 _ => return None,
             }
         }
-        let usual =
-            !dialect.decimal_comma && dialect.delimiter != b' ' && !dialect.delimiter.is_ascii_digit();
+        let usual = !dialect.decimal_comma
+            && dialect.thousands.is_none()
+            && dialect.delimiter != b' '
+            && !dialect.delimiter.is_ascii_digit();
         usual.then_some(Self { delimiter: dialect.delimiter, comment: dialect.comment, columns, wanted })
     }
 
@@ -326,9 +337,9 @@ fn row(
                     Some(value) => out.numbers[next].push(value * scale + offset),
                     None => return Err(explain(start, width, index)),
                 },
-                Want::Stamp { scale, offset } => {
+                Want::Stamp { scale, offset, order } => {
                     let cell = cells.text().map_err(|()| open_quote(line))?;
-                    match time_stamp(&cell) {
+                    match time_stamp_in(&cell, order) {
                         Some(seconds) => out.numbers[next].push(seconds * scale + offset),
                         None => return Err(explain_stamp(start, width, index)),
                     }

@@ -184,8 +184,9 @@ fn described(quantity: Quantity, column: &Column) -> (Role, Want) {
         let values = values.iter().map(|(word, value)| (word.clone(), convert(*value))).collect();
         return (Role::Coded(quantity, values), Want::Text);
     }
-    if column.is_stamp(quantity) {
-        return (Role::Quantity(quantity), Want::Stamp { scale: column.scale, offset: column.offset });
+    if let Some(order) = column.stamp(quantity) {
+        let want = Want::Stamp { scale: column.scale, offset: column.offset, order };
+        return (Role::Quantity(quantity), want);
     }
     // The sign of a displacement is part of the scale; its zero is found later, in SI.
     let sign = if column.positive == Some(super::import::Positive::Extension) { -1.0 } else { 1.0 };

@@ -3,7 +3,7 @@
 use super::blocks::Rows;
 use super::cells::{Want, Wanted, Words};
 use super::import::Missing;
-use crate::date::time_stamp;
+use crate::date::time_stamp_in;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -103,10 +103,10 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
                 let values = values.iter().enumerate().filter(|(row, _)| kept(row));
                 numbers = values.map(|(_, v)| v * scale + offset).collect();
             }
-            (Want::Stamp { scale, offset }, Column::Texts(texts)) => {
+            (Want::Stamp { scale, offset, order }, Column::Texts(texts)) => {
                 let texts = texts.iter().enumerate().filter(|(row, _)| kept(row));
                 let stamp = |(row, text): (usize, &String)| {
-                    let seconds = time_stamp(text).ok_or_else(|| {
+                    let seconds = time_stamp_in(text, order).ok_or_else(|| {
                         Error::new(DataCode::RecordingNotANumber, "not a time stamp")
                             .line(row as u64 + 1)
                             .column(name)

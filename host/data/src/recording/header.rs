@@ -2,7 +2,7 @@
 
 use super::cells::Dialect;
 use super::import::{Decimal, Import, Missing};
-use super::line::Cells;
+use super::line::{Cells, is_remark};
 use super::quantity::{Named, named};
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
@@ -11,6 +11,8 @@ use crate::pluralise::pluralise;
 pub(super) struct Header {
     pub dialect: Dialect,
     pub names: Vec<String>,
+    /// The lines above the rows that are neither blank nor remarks: names, units, and what a program writes above them.
+    pub head: Vec<Vec<u8>>,
     /// Bytes above the header or the first row.
     pub preamble: usize,
     /// Bytes and lines that the header takes.
@@ -20,6 +22,14 @@ pub(super) struct Header {
 
 impl Header {
     pub(super) fn read(text: &[u8], import: &Import) -> Result<Self> {
+        let mut header = Self::find(text, import)?;
+        let above = text[..header.bytes].split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end);
+        let told = |line: &&[u8]| !line.is_empty() && !is_remark(line, header.dialect.comment);
+        header.head = above.filter(told).map(<[u8]>::to_vec).collect();
+        Ok(header)
+    }
+
+    fn find(text: &[u8], import: &Import) -> Result<Self> {
         let comment = import.comment.and_then(|c| u8::try_from(c).ok());
         let mut bytes = 0;
         let mut lines = 0;
@@ -35,14 +45,14 @@ impl Header {
             }
             let end = line_end(rest);
             let line = rest[..end].trim_ascii_end();
-            let remarked = line.first().is_some_and(|b| Some(*b) == comment);
+            let remarked = is_remark(line, comment);
             // Spreadsheets tell each other the delimiter in a first line of its own.
             let telling = line.strip_prefix(b"sep=").filter(|d| d.len() == 1 && lines == 0);
             if let Some([delimiter]) = telling {
                 told = Some(*delimiter);
             }
             if remarked {
-                remark = &line[1..];
+                remark = &line.trim_ascii_start()[1..];
             }
             if skipped < import.skip_lines || line.is_empty() || remarked || telling.is_some() {
                 skipped += 1;
@@ -52,13 +62,17 @@ impl Header {
             }
             let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
             let delimiter = import.delimiter()?.or(told).unwrap_or_else(|| guess_delimiter(line, import));
+            let thousands = import.thousands()?;
             let with_row = |rows: &[u8]| {
                 let row = rows.split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
-                let commas = delimiter != b',' && has_decimal_commas(row.unwrap_or_default(), delimiter);
+                let commas = delimiter != b','
+                    && thousands != Some(b',')
+                    && has_decimal_commas(row.unwrap_or_default(), delimiter);
                 Dialect {
                     delimiter,
                     comment,
                     decimal_comma: import.decimal == Decimal::Comma || commas,
+                    thousands,
                     skip_missing: import.missing == Missing::Skip,
                 }
             };
@@ -72,14 +86,14 @@ impl Header {
             let cells = split(line)?;
             if import.header == Some(false) {
                 let names = (1..=cells.len()).map(|n| n.to_string()).collect();
-                return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
+                return Ok(Self { dialect, names, preamble: bytes, bytes, lines, head: Vec::new() });
             }
             let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
             if numbers > 0 && numbers == cells.len() {
                 // Some programs write the names as a remark.
                 let names = split(remark.trim_ascii())?;
                 if names.len() == cells.len() && names.iter().any(|n| named(n) != Named::Other) {
-                    return Ok(Self { dialect, names, preamble: bytes, bytes, lines });
+                    return Ok(Self { dialect, names, preamble: bytes, bytes, lines, head: Vec::new() });
                 }
                 return Err(Error::new(DataCode::RecordingMissingColumn, "the file has no header line")
                     .line(lines + 1)
@@ -94,9 +108,23 @@ impl Header {
             if let Some(names) = with_units(&cells, &split(units.trim_ascii_end())?) {
                 let (bytes, lines) = (bytes_here + units.len(), lines + 2);
                 let dialect = with_row(&below[units.len()..]);
-                return Ok(Self { dialect, names, preamble: bytes_here - end, bytes, lines });
+                return Ok(Self {
+                    dialect,
+                    names,
+                    preamble: bytes_here - end,
+                    bytes,
+                    lines,
+                    head: Vec::new(),
+                });
             }
-            return Ok(Self { dialect, names: cells, preamble: bytes, bytes: bytes_here, lines: lines + 1 });
+            return Ok(Self {
+                dialect,
+                names: cells,
+                preamble: bytes,
+                bytes: bytes_here,
+                lines: lines + 1,
+                head: Vec::new(),
+            });
         }
     }
 
@@ -129,7 +157,8 @@ fn with_units(names: &[String], below: &[String]) -> Option<Vec<String>> {
     (names.len() == below.len() && gained >= 2 && !numbers).then_some(joined)
 }
 
-fn mac_lines() -> Error {
+/// The error of a file with the line ends of old Macintosh computers.
+pub(super) fn mac_lines() -> Error {
     Error::new(DataCode::RecordingNotText, "lines end in carriage returns only")
         .help("save the file with usual line ends")
 }

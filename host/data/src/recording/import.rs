@@ -5,6 +5,7 @@
 //! header = false                    # then columns are named by their number, from 1
 //! delimiter = "tab"                 # "comma", "tab", "semicolon", "space" (runs of blanks) or one character
 //! comment = "#"                     # lines that begin so are skipped
+//! thousands = "."                   # what separates thousands: "," "." " " or "'"; nothing unless said otherwise
 //! decimal = "comma"                 # how decimals are written; "point" unless said otherwise
 //! missing = "skip"                  # leave out rows with empty cells or NaN; "error" unless said otherwise
 //! sheet = "Run 1"                   # of a workbook; the only one with contents unless said otherwise
@@ -12,10 +13,11 @@
 //! file_name = '(?<pressure_kPa>[0-9.]+)kPa'   # regular expression; what its named groups catch is constant per file
 //! preamble = 'pressure: (?<pressure_psi>[0-9.]+)' # the same for the skipped lines
 //! split_by = ["run"]                # one recording per value
+//! new_run = "clock"                 # a recording begins where the time goes back
 //!
 //! [columns.displacement]            # time, pressure, displacement, length, contraction, force, temperature,
 //! column = 2                        # pressure_command, cycle, direction, rest_length
-//! unit = "in"                       # of a time also "timestamp": 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25
+//! unit = "in"                       # of a time also "timestamp", "timestamp-month-first", "timestamp-day-first": 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25
 //! scale = 1.0                       # value in `unit` = cell · scale + offset
 //! offset = 0.0
 //! positive = "extension"            # or "contraction"
@@ -37,6 +39,10 @@
 //! file = "runs.csv"
 //! match = { file = "{file}", run = "run" }   # column of the table = column of the file
 //!
+//! [side_by_side]                    # recordings beside each other, with columns by number
+//! recordings = 2
+//! columns = 5                       # columns from one to the next
+//!
 //! [grid]                            # a static map: a row for each pressure, a column of force for each length
 //! columns = 'F_(?<length_mm>[0-9.]+)mm'  # headings of its columns; what the named groups catch goes with the column
 //! values = "force_N"                # what its cells are
@@ -44,104 +50,25 @@
 //!
 //! A quantity that is not described is looked for in the header under its usual name.
 
+mod column;
+mod side_by_side;
+mod value;
+
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
 use serde::Deserialize;
 
 use super::quantity::{Quantity, Unit};
+use super::thousands::SEPARATORS;
 use crate::error::{DataCode, Error, Result, nearest};
 use crate::file_kind::FileKind;
 use crate::toml_errors::toml_error;
 
-/// A column by name or by number, counted from 1.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
-pub enum ColumnRef {
-    /// Counted from 1.
-    Number(usize),
-    /// As the header has it.
-    Name(String),
-}
-
-impl fmt::Display for ColumnRef {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(number) => write!(f, "{number}"),
-            Self::Name(name) => write!(f, "{name}"),
-        }
-    }
-}
-
-/// Which way a displacement counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Positive {
-    /// Readings grow as the muscle gets longer.
-    Extension,
-    /// Readings grow as the muscle shortens.
-    Contraction,
-}
-
-/// Where a displacement of arbitrary zero has stroke 0, that is, where the muscle has its rest length.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum Zero {
-    /// At a reading, in the column's unit after scale and offset, before the sign.
-    At(f64),
-    /// At a place that the data show.
-    Found(FoundZero),
-}
-
-/// A zero that the data show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FoundZero {
-    /// Where the file begins.
-    First,
-    /// Where the muscle is longest, as on a machine that never stretches it beyond rest.
-    Longest,
-    /// Where the force is largest: the blocked force, at rest length.
-    LargestForce,
-}
-
-/// What one quantity is made from.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Column {
-    /// The column of the file or of the lookup table.
-    pub column: ColumnRef,
-    /// The unit after scale and offset; by default that of the column's name, or SI. `timestamp` for a time that is written as a date
-    /// with a time of day.
-    pub unit: Option<String>,
-    /// Value in `unit` = cell · scale + offset.
-    #[serde(default = "one")]
-    pub scale: f64,
-    /// See `scale`.
-    #[serde(default)]
-    pub offset: f64,
-    /// For displacements: which way is positive; contraction by default.
-    pub positive: Option<Positive>,
-    /// For displacements: where stroke 0 is; where the reading is 0 by default.
-    pub zero: Option<Zero>,
-    /// Text to number, for columns of words.
-    pub values: Option<BTreeMap<String, f64>>,
-}
-
-/// The unit of a time that is written as a date with a time of day, or as a time of day alone.
-pub(super) const TIME_STAMP: &str = "timestamp";
-
-impl Column {
-    /// Whether its cells are time stamps.
-    pub(super) fn is_stamp(&self, quantity: Quantity) -> bool {
-        quantity == Quantity::Time && self.unit.as_deref() == Some(TIME_STAMP)
-    }
-}
-
-fn one() -> f64 {
-    1.0
-}
+pub(super) use column::time_stamp_unit;
+pub use column::{Column, ColumnRef, FoundZero, Positive, Zero};
+pub use side_by_side::SideBySide;
+pub use value::Value;
 
 /// A table beside the recording, such as a list of runs with their geometry.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -162,6 +89,14 @@ pub struct Grid {
     pub columns: String,
     /// What its cells are: a name with its unit.
     pub values: String,
+}
+
+/// Where a recording begins, beside a change of the columns in `split_by`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum NewRun {
+    /// Where the time goes back.
+    Clock,
 }
 
 /// How decimals are written.
@@ -186,60 +121,6 @@ pub enum Missing {
     Skip,
 }
 
-/// A text or a number to compare cells with.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum Value {
-    /// A number; cells are compared as numbers.
-    Number(f64),
-    /// A text, or `{rest_length_mm}` or `{name}` of the muscle.
-    Text(String),
-    /// One of these.
-    AnyOf(Vec<Value>),
-    /// Everything but this.
-    Not {
-        /// What is excluded.
-        not: Box<Value>,
-    },
-}
-
-impl Value {
-    /// A filter of the command line, `COLUMN=VALUE`: the column and the value. `COLUMN!=VALUE` excludes, and `COLUMN=A,B` takes several;
-    /// a cell that holds the whole text with its commas passes, too.
-    ///
-    /// ```
-    /// use pam_data::recording::import::Value;
-    /// let text = |t: &str| Value::Text(t.to_owned());
-    /// assert_eq!(Value::of_option("run", "8"), ("run".to_owned(), text("8")));
-    /// let several = Value::AnyOf(vec![text("8,9"), text("8"), text("9")]);
-    /// assert_eq!(Value::of_option("run!", "8,9"), ("run".to_owned(), Value::Not { not: Box::new(several) }));
-    /// ```
-    #[must_use]
-    pub fn of_option(column: &str, text: &str) -> (String, Self) {
-        let whole = Self::Text(text.to_owned());
-        let value = if text.contains(',') {
-            let parts = text.split(',').map(|part| Self::Text(part.trim().to_owned()));
-            Self::AnyOf(std::iter::once(whole).chain(parts).collect())
-        } else {
-            whole
-        };
-        match column.strip_suffix('!') {
-            Some(column) => (column.trim_end().to_owned(), Self::Not { not: Box::new(value) }),
-            None => (column.to_owned(), value),
-        }
-    }
-
-    /// Whether it depends on the muscle's rest length.
-    pub(super) fn is_of_length(&self) -> bool {
-        match self {
-            Self::Text(text) => text == "{rest_length_mm}",
-            Self::Number(_) => false,
-            Self::AnyOf(values) => values.iter().any(Self::is_of_length),
-            Self::Not { not } => not.is_of_length(),
-        }
-    }
-}
-
 /// An import description.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -258,6 +139,8 @@ pub struct Import {
     /// How decimals are written.
     #[serde(default)]
     pub decimal: Decimal,
+    /// What separates thousands: `,`, `.`, a blank or an apostrophe; nothing by default.
+    pub thousands: Option<char>,
     /// What becomes of rows with empty cells, NaN or `---` in a column that is used.
     #[serde(default)]
     pub missing: Missing,
@@ -272,6 +155,10 @@ pub struct Import {
     /// Columns whose values set recordings apart.
     #[serde(default)]
     pub split_by: Vec<String>,
+    /// Where a recording begins beside that.
+    pub new_run: Option<NewRun>,
+    /// Recordings beside each other.
+    pub side_by_side: Option<SideBySide>,
     /// By quantity.
     #[serde(default)]
     pub columns: BTreeMap<String, Column>,
@@ -322,7 +209,7 @@ impl Import {
             }
             if let Some(unit) = &column.unit
                 && quantity.unit(unit).is_none()
-                && !column.is_stamp(quantity)
+                && column.stamp(quantity).is_none()
             {
                 return Err(invalid(format!("{name} has no unit `{unit}`"))
                     .column(name)
@@ -354,7 +241,21 @@ impl Import {
         pattern("preamble", self.preamble.as_deref())?;
         pattern("grid.columns", self.grid.as_ref().map(|g| g.columns.as_str()))?;
         self.delimiter()?;
-        Ok(())
+        self.thousands()?;
+        self.check_side_by_side()
+    }
+
+    /// What separates thousands.
+    pub(super) fn thousands(&self) -> Result<Option<u8>> {
+        let Some(separator) = self.thousands else { return Ok(None) };
+        let decimal = if self.decimal == Decimal::Comma { ',' } else { '.' };
+        let known = SEPARATORS.iter().find(|s| char::from(**s) == separator && separator != decimal);
+        known.map(|s| Some(*s)).ok_or_else(|| {
+            Error::new(DataCode::ImportInvalid, "this cannot separate thousands")
+                .column("thousands")
+                .value(separator.to_string())
+                .help("use \",\", \".\", \" \" or \"'\", and not the decimal sign")
+        })
     }
 
     pub(super) fn delimiter(&self) -> Result<Option<u8>> {

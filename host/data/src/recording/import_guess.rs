@@ -18,6 +18,7 @@
 //! ```
 
 mod absolute;
+mod forms;
 mod layout;
 mod lookup;
 mod named_length;
@@ -28,6 +29,7 @@ mod problems;
 mod roles;
 mod runs;
 mod sample;
+mod side_by_side;
 mod stroke;
 mod text;
 mod time;
@@ -96,12 +98,20 @@ pub struct Guess {
     pub delimiter: Option<String>,
     /// Whether decimals are written with a comma.
     pub decimal_comma: bool,
-    /// Whether lines begin with a number sign.
-    pub remarks: bool,
+    /// What lines of remarks begin with.
+    pub remarks: Option<char>,
+    /// What separates thousands.
+    pub thousands: Option<char>,
+    /// Whether rows without a number in a column that is used are left out.
+    pub skip_missing: bool,
     /// Regular expressions for constants: `file_name` or `preamble`, and the expression.
     pub patterns: Vec<(&'static str, String)>,
     /// Columns that set runs apart.
     pub split_by: Vec<String>,
+    /// Whether a run begins where the time goes back.
+    pub new_run_by_clock: bool,
+    /// How many recordings stand side by side, and how many columns are from one to the next.
+    pub side_by_side: Option<(usize, usize)>,
     /// Columns that were understood.
     pub columns: Vec<GuessedColumn>,
     /// A filter for the rows of one muscle.
@@ -131,7 +141,8 @@ impl Guess {
             let scaled = c.scale != 1.0 || c.offset != 0.0;
             !(scaled || c.extension || c.from_longest || !c.values.is_empty())
         };
-        let whole = self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
+        let one = !self.new_run_by_clock && self.side_by_side.is_none();
+        let whole = one && self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
         whole && self.lookup.is_none() && self.columns.iter().all(plain)
     }
 

@@ -4,9 +4,15 @@ use std::borrow::Cow;
 
 use super::cells::Dialect;
 use super::decimal;
+use super::thousands;
 
 pub(super) fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
+}
+
+/// Whether a line begins with the sign of remarks, behind blanks.
+pub(super) fn is_remark(line: &[u8], comment: Option<u8>) -> bool {
+    comment.is_some() && line.trim_ascii_start().first() == comment.as_ref()
 }
 
 /// A line without its carriage return.
@@ -79,10 +85,14 @@ impl<'a> Cells<'a> {
     #[inline]
     pub(super) fn number(&mut self) -> Option<f64> {
         let start = self.blanks(self.at?);
-        if self.dialect.decimal_comma || self.line.get(start) == Some(&b'"') {
+        let Dialect { decimal_comma, thousands, .. } = self.dialect;
+        if decimal_comma || thousands.is_some() || self.line.get(start) == Some(&b'"') {
             let text = self.text().ok()?;
-            let text = text.trim();
-            let (value, used) = if self.dialect.decimal_comma {
+            let text = match thousands {
+                Some(separator) => thousands::without(text.trim(), separator, decimal_comma)?,
+                None => Cow::Borrowed(text.trim()),
+            };
+            let (value, used) = if decimal_comma {
                 // A point would be a separator of thousands, whose meaning we do not guess.
                 if text.contains('.') {
                     return None;

@@ -22,7 +22,8 @@ pub(super) fn read_lookup(recording: &Path, file: &str) -> Result<LookupTable> {
         return Err(Error::new(DataCode::RecordingEmpty, "the lookup table is empty").file(&path));
     };
     let delimiter = if header.contains(&b'\t') { b'\t' } else { b',' };
-    let dialect = Dialect { delimiter, comment: None, decimal_comma: false, skip_missing: false };
+    let dialect =
+        Dialect { delimiter, comment: None, decimal_comma: false, thousands: None, skip_missing: false };
     let open = |line: usize| {
         Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed")
             .file(&path)

@@ -30,7 +30,8 @@ pub(super) fn check(recording: &Recording, line_of_row: &dyn Fn(usize) -> u64) -
         } else if twice {
             "the row occurs twice: remove one of them"
         } else {
-            "time must strictly increase within a file; if several runs are in one file, split it (split_by)"
+            "time must strictly increase within a file; if several runs are in one file, split it (split_by, or new_run = \"clock\" where \
+             the clock begins again with each run), as `host import --guess` does"
         };
         return Err(Error::new(DataCode::RecordingTimeOrder, cause)
             .line(line(i + 1))

@@ -28,6 +28,7 @@ use crate::progress::Progress;
 mod constants;
 mod error_messages;
 mod grid;
+mod side_by_side;
 
 use constants::Constants;
 use error_messages::{block_error, rows_error};
@@ -162,6 +163,9 @@ impl<'a> Reader<'a> {
     }
 
     fn open(&self, path: &Path) -> Result<Vec<Recording>> {
+        if let Some((import, beside)) = self.import.and_then(|i| Some((i, i.side_by_side?))) {
+            return self.side_by_side(path, import, beside.recordings);
+        }
         let source = source::open(path, self.progress.as_ref(), self.hashes.is_some())?;
         if source.magic.is_empty() {
             return Err(Error::new(DataCode::RecordingEmpty, "the file is empty"));
@@ -243,6 +247,7 @@ impl<'a> Reader<'a> {
             header.dialect,
             &layout.plan.wanted,
             header.names.len(),
+            &header.head,
             source.size.or(average),
             Budget::default(),
         )

@@ -1,7 +1,8 @@
 //! The layout of a text file: what separates its cells, how decimals are written, where the names are and where the rows begin.
 
 use crate::recording::cells::Dialect;
-use crate::recording::line::Cells;
+use crate::recording::line::{Cells, is_remark};
+use crate::recording::thousands::{self, SEPARATORS};
 
 use super::names::unit;
 
@@ -15,8 +16,10 @@ const MOSTLY: f64 = 0.5;
 pub(super) struct Layout {
     pub delimiter: u8,
     pub decimal_comma: bool,
-    /// Whether lines begin with a number sign.
+    /// Whether lines are remarks.
     pub remarks: bool,
+    /// What these begin with.
+    pub comment: u8,
     /// The line of the names, counted from 0; `None` where no line names the columns.
     pub names_at: Option<usize>,
     pub names: Vec<String>,
@@ -30,14 +33,15 @@ impl Layout {
     /// The layout of a text, from its first lines; `None` where they are not a table.
     pub(super) fn of(lines: &[&[u8]]) -> Option<Self> {
         let judged = &lines[..lines.len().min(JUDGED)];
-        let remarks = judged.iter().any(|l| l.first() == Some(&b'#'));
+        let remarks = judged.iter().any(|l| is_remark(l, Some(b'#')));
         let (dialect, width) = dialect(judged)?;
         let rows: Vec<Option<Vec<String>>> = judged.iter().map(|l| cells(l, dialect)).collect();
         let numeric = numeric_columns(&rows, width, dialect.decimal_comma);
         let is_row = |row: &Option<Vec<String>>| {
             row.as_ref().is_some_and(|row| {
                 let number = |(cell, numeric): (&String, &bool)| {
-                    !numeric || number(cell, dialect.decimal_comma).is_some() || is_missing(cell)
+                    let plain = number(cell, dialect.decimal_comma).is_some() || is_missing(cell);
+                    !numeric || plain || has_thousands(cell, dialect.decimal_comma)
                 };
                 row.len() == width
                     && row.iter().zip(&numeric).all(number)
@@ -49,6 +53,7 @@ impl Layout {
             delimiter: dialect.delimiter,
             decimal_comma: dialect.decimal_comma,
             remarks,
+            comment: b'#',
             names_at: None,
             names: (1..=width).map(|n| n.to_string()).collect(),
             units: None,
@@ -75,6 +80,11 @@ impl Layout {
                 {
                     self.units = Some(row.clone());
                     (self.names_at, self.names) = (Some(at), names.clone());
+                } else if !are_units(row)
+                    && let Some((_, units)) =
+                        above.next().filter(|(_, units)| named(units) && are_units(units))
+                {
+                    self.units = Some(units.clone());
                 }
             }
             // Loggers write names for a column of remarks that most rows lack, or end every row with a delimiter.
@@ -83,8 +93,9 @@ impl Layout {
                 self.names[..width - 1].clone_from_slice(row);
             }
             _ => {
-                let remark = lines[..self.data_at].iter().rev().find(|l| l.first() == Some(&b'#'));
-                let row = remark.and_then(|remark| cells(remark[1..].trim_ascii(), dialect));
+                let remark = lines[..self.data_at].iter().rev().find(|l| is_remark(l, Some(b'#')));
+                let row =
+                    remark.and_then(|remark| cells(remark.trim_ascii_start()[1..].trim_ascii(), dialect));
                 if let Some(row) = row.filter(|row| named(row)) {
                     self.names = row;
                 }
@@ -116,15 +127,16 @@ impl Layout {
     pub(super) fn dialect(&self) -> Dialect {
         Dialect {
             delimiter: self.delimiter,
-            comment: Some(b'#'),
+            comment: Some(self.comment),
             decimal_comma: self.decimal_comma,
+            thousands: None,
             skip_missing: false,
         }
     }
 
     /// Whether the reader finds the names without help: in the line right above the rows.
     pub(super) fn has_header(&self, lines: &[&[u8]]) -> bool {
-        let blank = |l: &&[u8]| l.trim_ascii().is_empty() || l.first() == Some(&b'#');
+        let blank = |l: &&[u8]| l.trim_ascii().is_empty() || is_remark(l, Some(self.comment));
         self.units.is_none() && self.names_at.is_some_and(|at| lines[at + 1..self.data_at].iter().all(blank))
     }
 
@@ -143,7 +155,7 @@ impl Layout {
 /// The cells of a line; `None` for a blank line, a remark, and a quotation mark that is not closed.
 pub(super) fn cells(line: &[u8], dialect: Dialect) -> Option<Vec<String>> {
     let line = line.trim_ascii_end();
-    if line.is_empty() || line.first() == Some(&b'#') {
+    if line.is_empty() || is_remark(line, dialect.comment) {
         return None;
     }
     let line = if dialect.delimiter == b' ' { line.trim_ascii_start() } else { line };
@@ -162,6 +174,14 @@ pub(super) fn number(cell: &str, decimal_comma: bool) -> Option<f64> {
     cell.parse::<f64>().ok().filter(|v| v.is_finite())
 }
 
+/// Whether a cell is a number with separators of thousands.
+fn has_thousands(cell: &str, decimal_comma: bool) -> bool {
+    let decimal = if decimal_comma { b',' } else { b'.' };
+    SEPARATORS.into_iter().filter(|s| *s != decimal && thousands::has(cell, *s)).any(|s| {
+        thousands::without(cell.trim(), s, decimal_comma).is_some_and(|c| number_of(&c, decimal_comma))
+    })
+}
+
 fn number_of(cell: &str, decimal_comma: bool) -> bool {
     number(cell, decimal_comma).is_some()
 }
@@ -176,7 +196,7 @@ pub(super) fn is_missing(cell: &str) -> bool {
 /// The delimiter and the decimal sign under which the second half of the lines has equally many cells, and most of them numbers.
 fn dialect(lines: &[&[u8]]) -> Option<(Dialect, usize)> {
     let full: Vec<&[u8]> =
-        lines.iter().copied().filter(|l| !l.trim_ascii().is_empty() && l.first() != Some(&b'#')).collect();
+        lines.iter().copied().filter(|l| !l.trim_ascii().is_empty() && !is_remark(l, Some(b'#'))).collect();
     let body = &full[full.len() / 2..];
     let mut best: Option<(f64, Dialect, usize)> = None;
     for delimiter in *b"\t;,| " {
@@ -185,7 +205,8 @@ fn dialect(lines: &[&[u8]]) -> Option<(Dialect, usize)> {
             if delimiter == b',' && decimal_comma && !body.iter().any(|l| l.contains(&b'"')) {
                 continue;
             }
-            let dialect = Dialect { delimiter, comment: Some(b'#'), decimal_comma, skip_missing: false };
+            let comment = Some(b'#');
+            let dialect = Dialect { delimiter, comment, decimal_comma, thousands: None, skip_missing: false };
             let rows: Vec<Vec<String>> = body.iter().filter_map(|l| cells(l, dialect)).collect();
             let Some(width) = usual_width(&rows) else { continue };
             let like = rows.iter().filter(|r| r.len() == width);

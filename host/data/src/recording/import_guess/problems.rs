@@ -1,4 +1,4 @@
-//! What is wrong with a file for every reader: words among numbers, rows without numbers, recordings side by side.
+//! What is wrong with a file for every reader: words among numbers, rows without numbers, clocks that go back.
 
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
@@ -88,37 +88,29 @@ pub(super) fn incomplete_rows(sample: &Sample, guess: &mut Guess) {
     }
 }
 
-/// Several recordings beside each other, each with its own columns.
-pub(super) fn side_by_side(sample: &Sample, guess: &mut Guess) {
-    let count = |quantity: Quantity| {
-        let named = |c: &&SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == quantity);
-        sample.columns.iter().filter(named).count()
+/// The row behind which a counter of a microcontroller began again, counted from 1, and its bits; none where the time ever goes back
+/// elsewhere.
+pub(super) fn wraps(time: &SampleColumn) -> Option<(usize, u32)> {
+    /// Of its size, how near to it the last reading before is, and how near to zero the first one after.
+    const NEAR: f64 = 0.01;
+    let back = || time.numbers.windows(2).enumerate().filter(|(_, w)| !(w[1] > w[0]));
+    let (first, _) = back().next()?;
+    let of = |bits: &u32| {
+        let size = (1_u64 << bits) as f64;
+        back().all(|(_, w)| w[0] > (1.0 - NEAR) * size && w[0] < size && w[1] < NEAR * size)
     };
-    let times = count(Quantity::Time);
-    if times > 1 && count(Quantity::Force) == times {
-        guess.unknown.push(format!(
-            "{times} columns of time and {times} of force: the recordings seem to stand side by side, and only the first is described; make \
-             one file of each"
-        ));
-    }
+    [16, 32].into_iter().find(of).map(|bits| (first + 1, bits))
 }
 
 /// A time that does not increase at some rows of the same run.
 pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
-    /// Counters of microcontrollers begin again here.
-    const WRAPS: f64 = 4_294_967_296.0;
-    /// Of that, how near to it the last reading before is, and how near to zero the first one after.
-    const NEAR: f64 = 0.01;
     let rows = time.numbers.len();
-    let wraps = |w: &[f64]| w[0] > (1.0 - NEAR) * WRAPS && w[0] < WRAPS && w[1] < NEAR * WRAPS;
     let problem = if 4 * at > rows {
         "the clock is coarser than the rows: log more digits, or replace the time by sample_interval_s where rows are equally spaced"
             .to_owned()
-    } else if let (1, Some(row)) = (at, time.numbers.windows(2).position(wraps)) {
-        format!(
-            "a counter of 32 bits began again behind row {}: add 4294967296 to the times that follow",
-            row + 1
-        )
+    } else if let Some((row, bits)) = wraps(time) {
+        let size = 1_u64 << bits;
+        format!("a counter of {bits} bits began again behind row {row}: add {size} to the times that follow")
     } else {
         "no column says which run a row belongs to: make one file of each run, or remove the rows that are given twice".to_owned()
     };

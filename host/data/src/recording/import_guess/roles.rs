@@ -7,9 +7,10 @@ use super::names::{Family, Name, Score};
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
 use super::{
-    Guess, GuessedColumn, Source, absolute, named_length, named_pressure, problems, runs, stroke, time,
-    values,
+    Guess, GuessedColumn, Source, absolute, named_length, named_pressure, problems, runs, side_by_side,
+    stroke, time, values,
 };
+use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 use crate::short_number::short;
 
@@ -22,12 +23,14 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
         header: sample.has_header,
         sheet: sample.sheet.clone(),
         checks: sample.notes.clone(),
+        unknown: sample.unclear.clone(),
         ..Guess::default()
     };
     if let Some(layout) = &sample.layout {
         guess.delimiter = sample.sheet.is_none().then(|| layout.delimiter_name().to_owned());
         guess.decimal_comma = layout.decimal_comma;
-        guess.remarks = layout.remarks;
+        guess.remarks = layout.remarks.then(|| char::from(layout.comment));
+        guess.thousands = sample.thousands.map(char::from);
         guess.skip_lines =
             if sample.has_header { layout.names_at.unwrap_or(layout.data_at) } else { layout.data_at };
     }
@@ -62,8 +65,9 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     named_length::find(others, &mut guess);
     stroke::judge(sample, others, &mut guess);
     absolute::ask(sample, &mut guess);
-    problems::incomplete_rows(sample, &mut guess);
-    problems::side_by_side(sample, &mut guess);
+    if !side_by_side::find(sample, &mut used, &mut guess) {
+        problems::incomplete_rows(sample, &mut guess);
+    }
     problems::other_columns(sample, others, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
     guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
@@ -259,7 +263,17 @@ fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess)
     if left > 0
         && let Some(t) = time
     {
-        problems::clock(&sample.columns[t], left, guess);
+        let clock = &sample.columns[t];
+        guess.new_run_by_clock = problems::wraps(clock).is_none() && runs::by_clock(clock);
+        if guess.new_run_by_clock {
+            guess.checks.push(format!(
+                "{} begins again at {}: a recording begins there",
+                clock.header,
+                pluralise(left, "row")
+            ));
+        } else {
+            problems::clock(clock, left, guess);
+        }
     }
     for n in splits {
         used[n] = true;
@@ -332,6 +346,10 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
+    // Nothing is described then.
+    if guess.unknown.iter().any(|u| u.contains("stand side by side")) {
+        return;
+    }
     let told = |guess: &Guess, quantity: Quantity| {
         let named = |c: &&SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == quantity);
         sample.columns.iter().filter(named).any(|c| guess.unknown.iter().any(|u| u.starts_with(&c.header)))

@@ -45,6 +45,21 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
     (chosen, left)
 }
 
+/// Whether the clock begins again with each run: wherever the time goes back, it goes back to where it began.
+pub(super) fn by_clock(time: &SampleColumn) -> bool {
+    /// Of the time of the run before, how near to the beginning of the first.
+    const NEAR: f64 = 0.1;
+    let time = &time.numbers;
+    let starts: Vec<usize> =
+        (0..time.len()).filter(|i| *i == 0 || !(time[*i] > time[i - 1])).chain([time.len()]).collect();
+    let long = starts.windows(2).all(|w| w[1] - w[0] >= LEAST_ROWS);
+    let again = |i: &usize| {
+        let before = time[i - 1] - time[0];
+        before > 0.0 && (time[*i] - time[0]).abs() <= NEAR * before
+    };
+    long && starts[1..starts.len() - 1].iter().all(again)
+}
+
 /// Columns called run, mounting or so that number the runs of a file whose clock continues: together they never come back to an earlier
 /// value. Joined into one recording, runs at different held lengths would look like motion.
 fn numbered(columns: &[SampleColumn]) -> Vec<usize> {

@@ -4,15 +4,18 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 
-use super::layout::{Layout, cells, is_missing, number};
+use super::forms::{self, Forms};
+use super::layout::{Layout, cells, is_missing};
 use super::names::Name;
-use crate::date::time_stamp;
+use crate::date::{DateOrder, time_stamp_in};
 use crate::error::{DataCode, Error, Result};
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
+use crate::recording::header::mac_lines;
 use crate::recording::line::decode;
 use crate::recording::mcap::Needed;
 use crate::recording::source;
+use crate::recording::time_of_day;
 #[cfg(feature = "excel")]
 use crate::recording::workbook;
 
@@ -20,6 +23,8 @@ use crate::recording::workbook;
 const LOOKED_AT: u64 = 32 << 20;
 /// Rows that are looked at.
 const ROWS: usize = 300_000;
+/// Columns of a container have no form of their own.
+const PLAIN: Forms = Forms { decimal_comma: false, thousands: None, order: DateOrder::YearFirst };
 /// A column with more different values than this is a measurement, no label.
 const LABELS: usize = 1000;
 
@@ -37,6 +42,8 @@ pub(super) struct SampleColumn {
     pub texts: usize,
     /// The first of these.
     pub first_text: Option<String>,
+    /// The first row of a new day, counted from 1, where times of day pass midnight.
+    pub midnight: Option<usize>,
     /// How many of these are dates with a time of day, or times of day.
     pub stamps: usize,
     /// The different cells, where there are few, and which of them each row has.
@@ -73,10 +80,10 @@ impl SampleColumn {
         Self { header: header.to_owned(), name, levels: Some(Levels::default()), ..Self::default() }
     }
 
-    fn push(&mut self, cell: &str, decimal_comma: bool) {
+    fn push(&mut self, cell: &str, forms: Forms) {
         let cell = cell.trim();
-        let value = number(cell, decimal_comma);
-        let stamp = if value.is_none() { time_stamp(cell) } else { None };
+        let value = forms.number(cell);
+        let stamp = if value.is_none() { time_stamp_in(cell, forms.order) } else { None };
         match value {
             None if is_missing(cell) => self.missing += 1,
             None => {
@@ -128,8 +135,14 @@ pub(super) struct Sample {
     pub rows: usize,
     /// Whether these are all rows.
     pub whole: bool,
-    /// How the columns of a container were made.
+    /// How dates with slashes are read.
+    pub order: DateOrder,
+    /// What separates thousands.
+    pub thousands: Option<u8>,
+    /// How the columns of a container were made, and what was found about the form of a text.
     pub notes: Vec<String>,
+    /// What is not clear about its form.
+    pub unclear: Vec<String>,
 }
 
 impl Sample {
@@ -170,12 +183,16 @@ impl Sample {
             lines.pop();
         }
         // Spreadsheets tell each other the delimiter in a first line, which the reader understands without help.
-        let Some(layout) = Layout::of(&lines) else {
+        if lines[0].contains(&b'\r') {
+            return Err(mac_lines());
+        }
+        let Some(mut layout) = Layout::of(&lines) else {
             return Err(Error::new(DataCode::RecordingNotText, "no table of numbers is found in this file").help(
                 "a recording has one row per reading, with equally many cells separated by commas, tabs, semicolons or blanks",
             ));
         };
-        let dialect = layout.dialect();
+        layout.comment = forms::sign_of_remarks(&lines, &layout);
+        layout.remarks |= layout.comment != b'#';
         let lossy = |l: &&[u8]| decode(l).trim_end().to_owned();
         let names_at = layout.names_at.unwrap_or(layout.data_at);
         let mut sample = Self {
@@ -185,23 +202,70 @@ impl Sample {
             whole,
             ..Self::default()
         };
-        for line in &lines[layout.data_at..] {
-            let Some(row) = cells(line, dialect) else { continue };
-            // The reader reports the line that has too few or too many cells.
-            if row.len() != sample.columns.len() || row.iter().all(|c| c.is_empty()) {
+        let rows = sample.rows_of(&lines, &layout);
+        let mut form = Forms::of(&layout);
+        sample.fill(&rows, form);
+        let cells_of = |n: usize| rows.iter().map(|row| row[n].as_str()).collect();
+        let found = forms::find(&sample.columns, cells_of, &mut form);
+        if form.thousands.is_some() || form.order != DateOrder::YearFirst {
+            sample.columns = columns_of(&layout);
+            sample.fill(&rows, form);
+        }
+        (sample.thousands, sample.order) = (form.thousands, form.order);
+        sample.notes.extend(found.checks);
+        sample.unclear.extend(found.unknown);
+        sample.layout = Some(layout);
+        Ok(sample)
+    }
+
+    /// The cells of the first rows. The lines above the table may stand among them again.
+    fn rows_of(&mut self, lines: &[&[u8]], layout: &Layout) -> Vec<Vec<String>> {
+        let words = |line: &&[u8]| line.iter().any(u8::is_ascii_alphabetic);
+        let head: Vec<&[u8]> =
+            lines[..layout.data_at].iter().map(|l| l.trim_ascii_end()).filter(words).collect();
+        let mut rows = Vec::new();
+        let mut again = Vec::new();
+        for (number, line) in (layout.data_at + 1..).zip(&lines[layout.data_at..]) {
+            if head.contains(&line.trim_ascii_end()) {
+                again.push(number);
                 continue;
             }
-            for (column, cell) in sample.columns.iter_mut().zip(&row) {
-                column.push(cell, layout.decimal_comma);
+            let Some(row) = cells(line, layout.dialect()) else { continue };
+            // The reader reports the line that has too few or too many cells.
+            if row.len() != layout.names.len() || row.iter().all(String::is_empty) {
+                continue;
             }
-            sample.rows += 1;
-            if sample.rows == ROWS {
-                sample.whole = false;
+            if row.iter().all(|cell| layout.names.contains(cell)) {
+                self.unclear.push(format!(
+                    "line {number} names the columns again in another order: make one file of each part"
+                ));
+            }
+            rows.push(row);
+            if rows.len() == ROWS {
+                self.whole = false;
                 break;
             }
         }
-        sample.layout = Some(layout);
-        Ok(sample)
+        if let Some(first) = again.first() {
+            self.notes.push(format!(
+                "lines above the table stand again among the rows, first in line {first}, and are left out"
+            ));
+        }
+        self.rows = rows.len();
+        rows
+    }
+
+    /// Reads the cells.
+    fn fill(&mut self, rows: &[Vec<String>], form: Forms) {
+        for row in rows {
+            for (column, cell) in self.columns.iter_mut().zip(row) {
+                column.push(cell, form);
+            }
+        }
+        for column in self.columns.iter_mut().filter(|c| c.is_stamped()) {
+            let rows = time_of_day::past_midnight(&mut column.numbers, 1.0, 0.0);
+            column.midnight = rows.first().map(|row| row + 1);
+        }
     }
 
     fn of_columns(table: &[(String, Stored)]) -> Self {
@@ -212,10 +276,10 @@ impl Sample {
                 Stored::Numbers(numbers) => {
                     sample.whole &= numbers.len() <= ROWS;
                     for value in numbers.iter().take(ROWS) {
-                        column.push(&value.to_string(), false);
+                        column.push(&value.to_string(), PLAIN);
                     }
                 }
-                Stored::Texts(texts) => texts.iter().take(ROWS).for_each(|t| column.push(t, false)),
+                Stored::Texts(texts) => texts.iter().take(ROWS).for_each(|t| column.push(t, PLAIN)),
                 Stored::Other(_) => continue,
             }
             sample.rows = sample.rows.max(column.numbers.len());

@@ -47,6 +47,9 @@ pub(super) fn description(guess: &Guess) -> String {
             quoted(value)
         );
     }
+    if let Some((recordings, columns)) = guess.side_by_side {
+        let _ = writeln!(out, "\n[side_by_side]\nrecordings = {recordings}\ncolumns = {columns}");
+    }
     if let Some(lookup) = &guess.lookup {
         let keys: Vec<String> =
             lookup.keys.iter().map(|(theirs, own)| format!("{} = {}", key(theirs), quoted(own))).collect();
@@ -74,8 +77,14 @@ fn file_form(guess: &Guess) -> String {
     if guess.decimal_comma {
         out += "decimal = \"comma\"\n";
     }
-    if guess.remarks {
-        out += "comment = \"#\"\n";
+    if let Some(separator) = guess.thousands {
+        let _ = writeln!(out, "thousands = {}", quoted(&separator.to_string()));
+    }
+    if let Some(sign) = guess.remarks {
+        let _ = writeln!(out, "comment = {}", quoted(&sign.to_string()));
+    }
+    if guess.skip_missing {
+        out += "missing = \"skip\"\n";
     }
     for (name, pattern) in &guess.patterns {
         let _ = writeln!(out, "{name} = {}", literal(pattern));
@@ -83,6 +92,9 @@ fn file_form(guess: &Guess) -> String {
     if !guess.split_by.is_empty() {
         let list: Vec<String> = guess.split_by.iter().map(|n| quoted(n)).collect();
         let _ = writeln!(out, "split_by = [{}]", list.join(", "));
+    }
+    if guess.new_run_by_clock {
+        out += "new_run = \"clock\"\n";
     }
     out
 }

@@ -3,8 +3,9 @@
 use super::roles::source;
 use super::sample::{Sample, SampleColumn};
 use super::{Guess, GuessedColumn, values};
+use crate::date::{DateOrder, time_stamp};
 use crate::recording::Quantity;
-use crate::recording::import::TIME_STAMP;
+use crate::recording::import::time_stamp_unit;
 
 /// The time where no column of numbers is named for it: time stamps, or a column that increases from row to row.
 pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
@@ -18,11 +19,13 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
     let found = all().filter(stamped).find(|(_, c)| is_time(c)).or_else(|| all().find(stamped));
     if let Some((n, column)) = found {
         used[n] = true;
-        guess.columns.insert(0, time_column(sample, n, TIME_STAMP, 1.0, None));
-        let of_day = column.levels.as_ref().is_some_and(|l| l.words.iter().all(|w| w.find(':') == Some(2)));
-        if of_day {
-            let header = &column.header;
-            guess.checks.push(format!("{header} is a time of day: a recording past midnight is not read"));
+        let plain = column.first_text.as_deref().is_some_and(|text| time_stamp(text).is_some());
+        let order = if plain { DateOrder::YearFirst } else { sample.order };
+        guess.columns.insert(0, time_column(sample, n, time_stamp_unit(order), 1.0, None));
+        if let Some(row) = column.midnight {
+            guess
+                .checks
+                .push(format!("{} passes midnight at row {row}: a day is added from there", column.header));
         }
         return;
     }
@@ -32,6 +35,9 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
         text.contains(':') || text.matches(['-', '/', '.']).count() > 1
     };
     if let Some(column) = sample.columns.iter().find(|c| !c.is_numeric() && is_time(c) && dated(c)) {
+        if guess.unknown.iter().any(|line| line.starts_with(&column.header)) {
+            return;
+        }
         guess.unknown.push(format!(
             "{} holds dates or times of day that are not read: write them as 2026-11-21T13:30:00.25, write seconds from some beginning, or \
              give sample_interval_s",

@@ -50,11 +50,13 @@ pub(super) fn rows_error(error: RowsError, header: &Header, import: &Import) -> 
             let comma =
                 value.contains(',') && value.chars().all(|c| c.is_ascii_digit() || ",.-+ ".contains(c));
             let of_a_clock = value.contains(':') || value.matches(['-', '/']).count() == 2;
-            let help = if of_a_clock && value.starts_with(|c: char| c.is_ascii_digit()) {
+            let help = if header.names.contains(&value) {
+                "the names of the columns stand here again, in another order or with other columns: make one file of each part"
+            } else if of_a_clock && value.starts_with(|c: char| c.is_ascii_digit()) {
                 "dates and times of day need unit = \"timestamp\" in an import description, which `host import --guess` writes; or write \
                  seconds from some beginning (in a spreadsheet =(A2-A$2)*86400)"
             } else if value.contains(',') && value.contains('.') {
-                "write numbers without thousands separators"
+                "write numbers without thousands separators, or give thousands = \",\" or \".\" in an import description"
             } else if comma && !header.dialect.decimal_comma {
                 "use a decimal point, or an import description with decimal = \"comma\""
             } else if header.dialect.decimal_comma && value.contains('.') && import.decimal == Decimal::Comma

@@ -1,0 +1,98 @@
+//! Columns of the table beside the file.
+
+use std::collections::HashMap;
+
+use super::super::blocks::Rows;
+use super::super::cells::{Want, Words};
+use super::super::column_plan::Role;
+use super::{Job, LookupTable, Table, number, same};
+use crate::date::time_stamp_in;
+use crate::error::{DataCode, Error, Result};
+
+/// Reads them for each row.
+pub(super) fn look_up(
+    job: &Job<'_>,
+    rows: &Rows,
+    table: &mut Table,
+    keys: &HashMap<usize, Words>,
+    lookup: &LookupTable,
+) -> Result<()> {
+    let Some(described) = &job.import.lookup else { return Ok(()) };
+    let file = job.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut columns = Vec::new();
+    for (n, theirs) in described.keys.keys().enumerate() {
+        let index = lookup.header.iter().position(|h| h == theirs).ok_or_else(|| {
+            Error::new(DataCode::ImportInvalid, format!("the lookup table has no column `{theirs}`"))
+                .file(&described.file)
+                .help(format!("it has {}", lookup.header.join(", ")))
+        })?;
+        columns.push((index, keys.get(&n)));
+    }
+    let find = |row: usize| {
+        let wanted: Vec<&str> =
+            columns.iter().map(|(_, words)| words.map_or(file.as_str(), |w| w.get(row))).collect();
+        let fits = |line: &&Vec<String>| {
+            columns
+                .iter()
+                .zip(&wanted)
+                .all(|((i, _), want)| line.get(*i).is_some_and(|have| same(have, want)))
+        };
+        lookup.rows.iter().find(fits).ok_or_else(|| {
+            Error::new(
+                DataCode::ImportInvalid,
+                format!("{} has no line for {}", described.file, wanted.join(", ")),
+            )
+            .line(job.first_line + rows.map.line(row))
+            .help("complete the lookup table, or leave these rows out by [where]")
+        })
+    };
+    let mut last: Option<(Vec<u32>, &Vec<String>)> = None;
+    let mut lines = Vec::with_capacity(rows.rows);
+    for row in 0..rows.rows {
+        let code: Vec<u32> =
+            columns.iter().map(|(_, w)| w.and_then(|w| w.codes.get(row).copied()).unwrap_or(0)).collect();
+        let line = match &last {
+            Some((previous, line)) if *previous == code => *line,
+            _ => find(row)?,
+        };
+        last = Some((code, line));
+        lines.push(line);
+    }
+    for column in &job.plan.looked_up {
+        let name = &lookup.header[column.index];
+        let cell = |line: &Vec<String>| line.get(column.index).cloned().unwrap_or_default();
+        let convert = |line: &&Vec<String>| match (column.want, &column.role) {
+            (Want::Number { scale, offset }, _) => {
+                number(&cell(line)).filter(|v| v.is_finite()).map(|v| v * scale + offset).ok_or_else(|| {
+                    Error::new(DataCode::RecordingNotANumber, "not a number in the lookup table")
+                        .file(&described.file)
+                        .column(name)
+                        .value(cell(line))
+                })
+            }
+            (Want::Text, Role::Coded(_, values)) => values.get(cell(line).trim()).copied().ok_or_else(|| {
+                Error::new(DataCode::RecordingNotANumber, "a word without a value")
+                    .file(&described.file)
+                    .value(cell(line))
+            }),
+            (Want::Stamp { scale, offset, order }, _) => {
+                time_stamp_in(&cell(line), order).map(|v| v * scale + offset).ok_or_else(|| {
+                    Error::new(DataCode::RecordingNotANumber, "not a time stamp in the lookup table")
+                        .file(&described.file)
+                        .column(name)
+                        .value(cell(line))
+                })
+            }
+            (Want::Text, _) => Ok(0.0),
+        };
+        match &column.role {
+            Role::Quantity(q) | Role::Coded(q, _) => {
+                table.quantities.insert(*q, lines.iter().map(convert).collect::<Result<_>>()?);
+            }
+            Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),
+            Role::Filter(n) => lines.iter().for_each(|l| table.filters[*n].push(&cell(l))),
+            Role::Key(_) => {}
+        }
+    }
+    Ok(())
+}

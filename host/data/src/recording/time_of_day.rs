@@ -1,0 +1,51 @@
+//! Times of day that pass midnight.
+
+/// A day, s.
+const DAY: f64 = 86_400.0;
+/// A step from one day to the next is at most this long, s: a recording has no longer pause.
+const STEP: f64 = 3600.0;
+
+/// Adds a day to times of day wherever they pass midnight, s = seconds · scale + offset; gives the rows at which they do. Dates are no times
+/// of day, and a longer step back is none of a clock that continues: both stay as they are.
+pub(super) fn past_midnight(times: &mut [f64], scale: f64, offset: f64) -> Vec<usize> {
+    let of_day = |t: &f64| (0.0..DAY).contains(&((t - offset) / scale)) || t.is_nan();
+    if !times.iter().all(of_day) {
+        return Vec::new();
+    }
+    let mut rows = Vec::new();
+    let mut days = 0.0;
+    let mut last = f64::NAN;
+    for (row, time) in times.iter_mut().enumerate() {
+        let now = (*time - offset) / scale;
+        if now < last && now + DAY - last < STEP {
+            days += 1.0;
+            rows.push(row);
+        }
+        if now.is_finite() {
+            last = now;
+        }
+        *time += days * DAY * scale;
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::past_midnight;
+
+    #[test]
+    fn only_a_short_step_over_midnight_adds_a_day() {
+        let of = |times: &[f64]| {
+            let mut times = times.to_vec();
+            let rows = past_midnight(&mut times, 1.0, 0.0);
+            (times, rows)
+        };
+        assert_eq!(of(&[86_399.0, 1.0, 2.0]), (vec![86_399.0, 86_401.0, 86_402.0], vec![1]));
+        assert_eq!(of(&[50_000.0, 40_000.0]).1, Vec::<usize>::new());
+        // s since 1970.
+        assert_eq!(of(&[1e9, 1.0]).0, [1e9, 1.0]);
+        let mut scaled = [2.0 * 86_399.0 + 5.0, 7.0];
+        assert_eq!(past_midnight(&mut scaled, 2.0, 5.0), [1]);
+        assert_eq!(scaled, [172_803.0, 172_807.0]);
+    }
+}
