@@ -77,13 +77,13 @@ pam_data::criteria! {
     LOSS_ROWS: usize = 3, "loss_rows", "1", Derived("a line and one degree of freedom");
     /// Rests at pressures below this share of the largest lose too little to count.
     LOSS_PRESSURE: f64 = 0.1, "loss_pressure", "1", Judgement;
-    /// Two rests are alike where their pressures differ by no more than this share of the range ...
+    /// Two rests are similar where their pressures differ by no more than this share of the range ...
     LOSS_ALIKE_PRESSURE: f64 = 0.05, "loss_alike_pressure", "1", Judgement;
     /// ... and the steps before them by no more than this share: pulses of another length differ by more.
     LOSS_ALIKE_STEP: f64 = 0.2, "loss_alike_step", "1", Measured("pulses of 10 and 5 ms, 30 to 60 ms");
-    /// Share of a run's rests that have one alike in BEFORE; with fewer the valves were set otherwise, and nothing is said.
+    /// Share of a run's rests that have a similar one in BEFORE; with fewer the valves were set otherwise, and nothing is said.
     LOSS_ALIKE_SHARE: f64 = 0.8, "loss_alike_share", "1", Convention("as UPDATE_COVERED");
-    /// Rests alike on both sides that a run must have.
+    /// Similar rests on both sides that a run must have.
     LOSS_RESTS: usize = 6, "loss_rests", "1", Judgement;
     /// Slopes further than this many robust deviations from the line count less.
     LOSS_CLIP: f64 = 2.0, "loss_clip", "1", Convention("Huber, two standard deviations");

@@ -2,13 +2,13 @@
 //!
 //! Between the pulses of a staircase the valves are closed. There the pressure changes by what the gas does after a step, which cools after
 //! filling and warms after venting, and by the leak, in proportion to itself: `dP/dt = … − λ·P`. What the gas does depends on the pressure,
-//! the step and its direction; so each rest is compared with rests of BEFORE that are alike in these, and a run's change of rate is
+//! the step and its direction; so each rest is compared with rests of BEFORE that are similar in these, and a run's change of rate is
 //!
 //! ```text
 //! λ = −Σ P·(dP/dt − mean of BEFORE) / Σ P²
 //! ```
 //!
-//! Other pulses have no rests alike, and show no change. A regulator that replaces what is lost hides the leak: its rests have no slope on
+//! Other pulses have no similar rests, and show no change. A regulator that replaces what is lost hides the leak: its rests have no slope on
 //! either side.
 
 use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdict, WhyNot, size};
@@ -94,7 +94,7 @@ fn alike(a: &Rest, b: &Rest, range: f64) -> bool {
         && ratio <= 1.0 / (1.0 - LOSS_ALIKE_STEP)
 }
 
-/// By how much the rate of a run differs from rests of BEFORE that are alike, 1/s: robust.
+/// By how much the rate of a run differs from similar rests of BEFORE, 1/s: robust.
 fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
     let beside = own.iter().filter_map(|rest| {
         let slopes = before.iter().filter(|b| alike(rest, b, range)).map(|b| b.slope);
@@ -120,7 +120,7 @@ fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
     rate.is_finite().then_some(rate)
 }
 
-/// AFTER's rates against BEFORE's in the mountings that both have; `None` where no mounting has rests alike on both sides.
+/// AFTER's rates against BEFORE's in the mountings that both have; `None` where no mounting has similar rests on both sides.
 pub(super) fn compare(runs: &Runs) -> Option<Loss> {
     if runs.moving {
         return None;
@@ -203,7 +203,7 @@ pub(super) fn add(report: &mut ChangeReport, loss: &Loss, none: f64) {
     report.probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let named = probability >= NAMED;
     if !named {
-        // The odds that the prior asks of the evidence; 1.28: with 90 %.
+        // The odds that the prior requires of the evidence; 1.28: with 90 %.
         let z = (2.0 * (1.0 / prior).ln() + 6.0).sqrt();
         report.considered.push(Considered {
             effect: about.name.into(),
@@ -260,7 +260,7 @@ mod tests {
     const PERIOD: f64 = 0.5;
 
     /// A staircase by pulses: the valves are closed between them, where the gas settles and a leak takes `rate` of the pressure per second.
-    /// A regulator replaces the loss where `held`. `stroke` in m, `number` tells the runs apart.
+    /// A regulator replaces the loss where `held`. `stroke` in m, `number` is that of the run.
     fn staircase(stroke: f64, number: usize, rate: f64, held: bool) -> Recording {
         let mut state = (7 + 131 * number + (stroke * 1e4) as usize) as u64;
         let mut uniform = move || {

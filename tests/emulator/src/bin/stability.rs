@@ -35,8 +35,8 @@ fn main() -> io::Result<()> {
          trim. Each curve and number of the fitted table is multiplied by a factor, one after another. The last two rows of each muscle \
          are corners, where all of them are wrong: the one whose slope ∂F/∂P is furthest from that of the muscle, and its opposite. Errors of a sine of \
          1 Hz and of a force that is held, rms in % of blocked force; swing and change of the command as in \
-         [tracking.md](tracking.md).\n\nThe slope error is the largest |g* − g|/g between 30 and 100 % of the highest pressure and up to 34 % \
-         of the free stroke, with the slope g of the table and g* of the muscle. The gain of the trim's loop is \
+         [tracking.md](tracking.md).\n\nThe slope error is the largest |g* − g|/g, with the slope g of the table and g* of the muscle. It is taken between 30 and 100 % of the highest pressure and up to 34 % \
+         of the free stroke. The gain of the trim's loop is \
          K_i (g + (g* − g) H)/s, where H is the response of the pressure to its demand. By the small-gain theorem, the loop is stable for \
          every H with a magnitude of at most 1 if the slope error is below 1. The lead of the regulator's command can raise the magnitude of H \
          somewhat above 1; the largest that was measured is in the section on bandwidth of [tracking.md](tracking.md).\n\n\

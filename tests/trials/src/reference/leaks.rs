@@ -24,7 +24,7 @@ pub struct Trial {
     muscle: String,
     half: Half,
     rate: f64,
-    /// Whether both sides have rests that are alike.
+    /// Whether both sides have similar rests.
     compared: bool,
     answer: Answer,
 }
@@ -82,7 +82,7 @@ pub fn section(trials: &[Trial]) -> String {
     }
     text.push_str(
         "\n## Leaks that closed valves show\n\nThe later runs lose pressure between the pulses of the valves, at a rate in proportion to it; the \
-         force follows by its slope over the pressure. All splits; in those between runs with other pulses few rests are alike, and the leak is \
+         force follows by its slope over the pressure. All splits; in those between runs with other pulses few rests are similar, and the leak is \
          not looked for. A rate of 0.005 1/s leaves 55 % after two minutes. \"Another name\": any \
          beside the leak. The constants were chosen with the muscles of both halves known.\n\n\
          | rate, 1/s | n | compared | named of these | another name | rate within 20 % | in the stated 95 % |\n| --- | --- | --- | --- | --- | --- | --- |\n",
