@@ -66,7 +66,7 @@ fn head(page: &mut Page, r: &ChangeReport) {
         "one cell, standard deviation",
         Tone::Plain,
     );
-    if !r.missing.is_empty() {
+    if r.shows_in_force() {
         let h = &r.held_out;
         page.fact(
             "on recordings held out",

@@ -85,6 +85,8 @@ pam_data::criteria! {
     LOSS_ALIKE_SHARE: f64 = 0.8, "loss_alike_share", "1", Convention("as UPDATE_COVERED");
     /// Similar rests on both sides that a run must have.
     LOSS_RESTS: usize = 6, "loss_rests", "1", Judgement;
+    /// How often the weights of the rests are taken anew.
+    LOSS_REWEIGHTED: usize = 5, "loss_reweighted", "1", Cost;
     /// Slopes further than this many robust deviations from the line count less.
     LOSS_CLIP: f64 = 2.0, "loss_clip", "1", Convention("Huber, two standard deviations");
     /// Spread of the rate between campaigns that is always allowed: 12 kPa in two minutes at 500 kPa.
@@ -176,6 +178,8 @@ pam_data::criteria! {
     UPDATE_COVERED: f64 = 0.8, "update_covered", "1", Judgement;
     /// Pressures, or lengths, of such a campaign.
     UPDATE_LEVELS: usize = 3, "update_levels", "1", Derived("a curve over the pressure");
+    /// Laws of one effect that are tried for one size, at most.
+    UPDATE_LAWS: usize = 2, "update_laws", "1", Cost;
     /// Mean pressures nearer than this share of the largest are one.
     UPDATE_SAME_LEVEL: f64 = 0.04, "update_same_level", "1", Convention("as LEVEL");
     /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.

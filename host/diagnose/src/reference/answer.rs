@@ -403,6 +403,13 @@ impl ChangeReport {
         self.probabilities.iter().find(|p| p.cause == cause).map_or(0.0, |p| p.probability)
     }
 
+    /// Whether a named change shows in the force: a leak of closed valves shows in the pressure alone.
+    #[must_use]
+    pub fn shows_in_force(&self) -> bool {
+        let in_pressure = |m: &Changed| m.change.effect().is_some_and(|e| e.traits().loses_air);
+        self.missing.iter().any(|m| !in_pressure(m) || m.rms_N > 0.0)
+    }
+
     /// The most probable cause.
     #[must_use]
     pub fn top(&self) -> &str {

@@ -15,16 +15,13 @@ use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdi
 use super::contrast::log_mean;
 use super::criteria::{
     CATALOGUE_LAW_ERROR, FAST_SHARE, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP,
-    LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES,
-    LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
+    LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_REWEIGHTED, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST,
+    LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
 };
 use super::motion;
 use super::runs::{Run, Runs};
 use super::shapes::{CHANGES, Change};
 use pam_fit::bench::Candidate;
-
-/// How often the weights of the rests are taken anew.
-const REWEIGHTED: usize = 5;
 
 /// A rest between two steps.
 #[derive(Debug, Clone, Copy)]
@@ -107,7 +104,7 @@ fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
     }
     let mut weights = vec![1.0; beside.len()];
     let mut rate = 0.0;
-    for _ in 0..REWEIGHTED {
+    for _ in 0..LOSS_REWEIGHTED {
         let sum =
             |f: &dyn Fn(&(f64, f64)) -> f64| beside.iter().zip(&weights).map(|(r, w)| w * f(r)).sum::<f64>();
         rate = -sum(&|r| r.0 * r.1) / sum(&|r| r.0 * r.0);
@@ -310,6 +307,7 @@ mod tests {
         assert!(size.low < 0.012 && 0.012 < size.high && size.low > 0.006, "{size:?}");
         assert!(leak.share_explained > 0.8 && leak.probability > 0.9, "{leak:?}");
         assert_eq!(report.top(), "leak");
+        assert!(!report.shows_in_force(), "a leak shows in the pressure");
         let total: f64 = report.probabilities.iter().map(|p| p.probability).sum();
         assert!((total - 1.0).abs() < 1e-9, "{total}");
     }

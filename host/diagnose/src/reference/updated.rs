@@ -8,11 +8,8 @@ use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 
 use super::answer::{ChangeReport, Changed};
-use super::criteria::{SAME_STROKE, UPDATE_COVERED, UPDATE_LEVELS, UPDATE_SAME_LEVEL};
+use super::criteria::{SAME_STROKE, UPDATE_COVERED, UPDATE_LAWS, UPDATE_LEVELS, UPDATE_SAME_LEVEL};
 use super::shapes::{Change, Class};
-
-/// Laws of one effect, at most.
-const MOST_LAWS: usize = 2;
 
 /// Whether recordings reach over what the table was tested at, so that a table can be fitted to them.
 pub(super) fn covers(after: &Campaign, table: &MuscleTable) -> bool {
@@ -120,7 +117,7 @@ pub(super) fn updated(
 ) -> Result<TableFile, String> {
     let mut best: Option<(f64, TableFile)> = None;
     let mut without_place = String::new();
-    for which in 0..MOST_LAWS {
+    for which in 0..UPDATE_LAWS {
         let mut new = file.clone();
         let own = report.missing.iter().filter(|m| !m.correction);
         if let Some(m) = own.clone().find(|m| !apply(&mut new.table, m, which)) {

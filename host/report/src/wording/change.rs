@@ -267,7 +267,7 @@ fn usual_unit(value: f64, unit: &str) -> (f64, String) {
         "s" if value.abs() < 1.0 => (1e3, "ms"),
         "m²" => (1e5, "N per 100 kPa"),
         "m/N" => (1e6, "µm/N"),
-        "1/s" => (6e3, "% per minute"),
+        "1/s" => (100.0, "kPa/s per 100 kPa"),
         "" => (100.0, "%"),
         other => (1.0, other),
     };
@@ -347,7 +347,7 @@ pub fn summary(r: &ChangeReport) -> String {
     if let Some((names, apart)) = separate::unnamed(r) {
         let _ = writeln!(text, "one of: {}; separate them by: {}", names.join(", "), apart.join("; "));
     }
-    if !r.missing.is_empty() {
+    if r.shows_in_force() {
         let h = &r.held_out;
         let share = if h.rms_before_N > 0.0 { 1.0 - (h.rms_after_N / h.rms_before_N).powi(2) } else { 0.0 };
         let _ = writeln!(

@@ -182,10 +182,11 @@ impl Sample {
         if !whole {
             lines.pop();
         }
-        // Spreadsheets tell each other the delimiter in a first line, which the reader understands without help.
-        if lines[0].contains(&b'\r') {
+        // A whole text that is one line without an end has none.
+        if lines.first().is_some_and(|line| line.trim_ascii_end().contains(&b'\r')) {
             return Err(mac_lines());
         }
+        // Spreadsheets tell each other the delimiter in a first line, which the reader understands without help.
         let Some(mut layout) = Layout::of(&lines) else {
             return Err(Error::new(DataCode::RecordingNotText, "no table of numbers is found in this file").help(
                 "a recording has one row per reading, with equally many cells separated by commas, tabs, semicolons or blanks",
