@@ -117,7 +117,8 @@ pub fn worst(subject: &Subject, off: f32) -> [Corner; 2] {
         Corner::of(subject, factors.collect())
     };
     let all = 1_u32 << parts.len();
-    let worst =
-        (0..all).max_by(|a, b| corner(*a).slope_error.total_cmp(&corner(*b).slope_error)).expect("a corner");
+    let errors: Vec<f64> = (0..all).map(|signs| corner(signs).slope_error).collect();
+    let larger = |a: &u32, b: &u32| errors[*a as usize].total_cmp(&errors[*b as usize]);
+    let worst = (0..all).max_by(larger).expect("a corner");
     [corner(worst), corner(all - 1 - worst)]
 }

@@ -282,7 +282,7 @@ fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does
     }
 }
 
-/// The whole table is `cargo run --release -p emulator-tests --bin tracking`.
+/// The whole table is `cargo run --release -p emulator-tests --bin stability`.
 #[test]
 fn no_number_of_a_table_that_is_wrong_by_a_fifth_makes_the_loop_swing() {
     use emulator_tests::misjudged;

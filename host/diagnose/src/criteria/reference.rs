@@ -180,8 +180,6 @@ pam_data::criteria! {
     UPDATE_LEVELS: usize = 3, "update_levels", "1", Derived("a curve over the pressure");
     /// Laws of one effect that are tried for one size, at most.
     UPDATE_LAWS: usize = 2, "update_laws", "1", Cost;
-    /// Mean pressures nearer than this share of the largest are one.
-    UPDATE_SAME_LEVEL: f64 = 0.04, "update_same_level", "1", Convention("as LEVEL");
     /// Rest lengths that differ by more than this share are of two actuators: a tape measure errs by less.
     OTHER_LENGTH: f64 = 0.02, "other_length", "1", Judgement;
     /// A recording shows a change where its rms is more than this share of that in the recording that shows it most.

@@ -12,7 +12,7 @@
 //! either side.
 
 use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdict, WhyNot, size};
-use super::contrast::log_mean;
+use super::contrast::{log_mean, student};
 use super::criteria::{
     CATALOGUE_LAW_ERROR, FAST_SHARE, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP,
     LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_REWEIGHTED, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST,
@@ -133,9 +133,8 @@ pub(super) fn compare(runs: &Runs) -> Option<Loss> {
             |(run, rests): &(&Run, Vec<Rest>)| Some((mounting, run.after, rate(rests, &before, range)?));
         rates.extend(own().filter_map(one));
     }
-    let side = |mounting: usize, after: bool| {
-        let own: Vec<f64> = rates.iter().filter(|r| r.0 == mounting && r.1 == after).map(|r| r.2).collect();
-        own
+    let side = |mounting: usize, after: bool| -> Vec<f64> {
+        rates.iter().filter(|r| r.0 == mounting && r.1 == after).map(|r| r.2).collect()
     };
     let (mut contrasts, mut squares, mut freedom) = (Vec::new(), 0.0, 0.0);
     for mounting in 0..runs.strokes.len() {
@@ -160,7 +159,7 @@ pub(super) fn compare(runs: &Runs) -> Option<Loss> {
     let spread = (LOSS_RUNS * LOSS_SPREAD * LOSS_SPREAD + squares) / (LOSS_RUNS + freedom);
     let variance = spread / weight + LOSS_FLOOR * LOSS_FLOOR;
     let degrees = LOSS_RUNS + freedom;
-    let density = |v: f64| -0.5 * v.ln() - 0.5 * (degrees + 1.0) * (change * change / (v * degrees)).ln_1p();
+    let density = |v: f64| student(change, v, degrees);
     let sizes: Vec<f64> = LOSS_SIZES.iter().map(|s| density(variance + s * s)).collect();
     Some(Loss {
         change,

@@ -32,6 +32,11 @@ pub(crate) fn log_sum(values: &[f64]) -> f64 {
     if top.is_finite() { top + values.iter().map(|v| (v - top).exp()).sum::<f64>().ln() } else { top }
 }
 
+/// Log density of Student's t, up to a constant of its degrees of freedom.
+pub(super) fn student(value: f64, variance: f64, degrees: f64) -> f64 {
+    -0.5 * variance.ln() - 0.5 * (degrees + 1.0) * (value * value / (variance * degrees)).ln_1p()
+}
+
 /// Log evidence of a shape over its absence: `a = s'Πs`, `b = s'Πy`, the amplitude normal with each of the sizes equally likely.
 pub(super) fn evidence(a: f64, b: f64, scale: f64, sizes: &[f64]) -> f64 {
     if !(a > 1e-12) {

@@ -96,8 +96,8 @@ pub fn table(
     }
     let of_actuator = report.missing.iter().any(|m| !m.correction);
     let old = before();
-    let campaign = |old: &TableFile| updated::covers(after, &old.table);
-    if of_actuator && !old.as_ref().is_ok_and(|o| !campaign(o)) {
+    let campaign = old.as_ref().map_or(true, |old| updated::covers(after, &old.table));
+    if of_actuator && campaign {
         return Ok((fitted(after, muscle)?, Done::Refitted));
     }
     let mut file = old?;
@@ -109,8 +109,8 @@ pub fn table(
     if !of_actuator {
         return Ok((file, Done::Corrected));
     }
-    match updated::updated(&file, report, after) {
-        Ok(updated) => file = updated,
+    let (with, file) = match updated::updated(&file, report, after) {
+        Ok(updated) => updated,
         Err(effect) => {
             return refused(
                 format!(
@@ -119,9 +119,8 @@ pub fn table(
                 "record a campaign like the one before, or fit anew with `host fit`",
             );
         }
-    }
-    let rms = |file: &TableFile| Ok::<_, Error>(predict(file, after)?.rms.unwrap_or(f64::INFINITY));
-    let (without, with) = (rms(&plain)?, rms(&file)?);
+    };
+    let without = predict(&plain, after)?.rms.unwrap_or(f64::INFINITY);
     if !(with < without && file.table.check().is_ok()) {
         return refused(
             format!(

@@ -1,7 +1,7 @@
 //! Delays between the channels, by rows in motion.
 
 use super::cells::Cell;
-use super::contrast::log_mean;
+use super::contrast::{log_mean, student};
 use super::criteria::{
     CELLS, LAG_AFTER_TURN, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, LAGS, MEDIAN_VARIANCE,
 };
@@ -254,7 +254,7 @@ fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     let each = |after: bool| (spread + own(after)) * share(after);
     let variance = MEDIAN_VARIANCE * (each(true) + each(false)) + LAG_FLOOR * LAG_FLOOR;
     let degrees = LAG_RUNS + freedom;
-    let density = |v: f64| -0.5 * v.ln() - 0.5 * (degrees + 1.0) * (lag * lag / (v * degrees)).ln_1p();
+    let density = |v: f64| student(lag, v, degrees);
     let each: Vec<f64> = LAG_SIZES.iter().map(|s| density(variance + s * s)).collect();
     // The sign is known, hence twice the density.
     Shift { lag, variance, unchanged: density(variance), changed: log_mean(&each) + std::f64::consts::LN_2 }

@@ -1,6 +1,7 @@
 //! From two sides to the answer: which protocol, which reference, and what both kinds of answers share.
 
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
+use super::closed_valves::Loss;
 use super::criteria::{
     COMBINED_UNREST, HELD, NAMED, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
 };
@@ -161,33 +162,32 @@ fn beside_recordings(
     let mut remarks = units::check(before, after)?;
     remarks.extend(sides::order(before, after));
     let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
-    let mut report = match described {
-        Some(geometry) => catalogue::compare(whole, given, geometry, options)?,
+    let (mut report, loss) = match described {
+        Some(geometry) => (catalogue::compare(whole, given, geometry, options)?, None),
         None => by_protocol(before, after, kind, options)?,
     };
     report.reference.files = files(before);
     report.reference.samples = whole.samples();
     report.remarks.splice(0..0, remarks);
     withdraw(&mut report);
-    if kind == Protocol::Held {
-        let runs = Runs::of(before, after, options.mounted)?;
-        if let Some(loss) = closed_valves::compare(&runs) {
-            closed_valves::add(&mut report, &loss, prior(options, PRIOR_NONE));
-        }
+    if let Some(loss) = loss {
+        closed_valves::add(&mut report, &loss, prior(options, PRIOR_NONE));
     }
     Ok(report)
 }
 
-/// Two campaigns of an actuator without a description, by the way in which both were recorded.
+/// Two campaigns of an actuator without a description, by the way in which both were recorded; and what closed valves lose, where that shows.
 fn by_protocol(
     before: &Campaign,
     after: &Campaign,
     kind: Protocol,
     options: &Options,
-) -> Result<ChangeReport> {
+) -> Result<(ChangeReport, Option<Loss>)> {
     match (protocol(before, "the reference")?, kind) {
         (Protocol::Held, Protocol::Held) => held(before, after, options),
-        (Protocol::Stroked, Protocol::Stroked) => strokes(&stroked::compare(before, after, 0.0)?, options),
+        (Protocol::Stroked, Protocol::Stroked) => {
+            Ok((strokes(&stroked::compare(before, after, 0.0)?, options)?, None))
+        }
         (Protocol::Combined, Protocol::Combined | Protocol::Stroked)
         | (Protocol::Stroked, Protocol::Combined) => {
             let (runs, plane) = combined::of(before, after, options.mounted)?;
@@ -238,7 +238,7 @@ pub(super) fn prior(options: &Options, usual: f64) -> f64 {
     if none > 0.01 && none < 0.99 { none } else { none.clamp(0.01, 0.99) }
 }
 
-fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<ChangeReport> {
+fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<(ChangeReport, Option<Loss>)> {
     let runs = Runs::of(before, after, options.mounted)?;
     if runs.side(true).next().is_none() {
         let list = |of: &mut dyn Iterator<Item = f64>| {
@@ -262,10 +262,11 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<Change
 }
 
 /// Runs on both sides.
-fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<ChangeReport> {
+fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<(ChangeReport, Option<Loss>)> {
+    let loss = closed_valves::compare(&runs);
     let reference = isometric::Reference { surface, error: 0.0, recorded: true };
     let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
-    Ok(staircases(&analysis, options))
+    Ok((staircases(&analysis, options), loss))
 }
 
 fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Options) -> Result<ChangeReport> {

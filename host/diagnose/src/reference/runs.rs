@@ -74,7 +74,7 @@ fn stroke(recording: &Recording) -> f64 {
 }
 
 /// Strokes that are further apart than a mounting's tolerance.
-fn mountings(recordings: &[Recording]) -> Vec<f64> {
+pub(super) fn mountings(recordings: &[Recording]) -> Vec<f64> {
     let mut all: Vec<f64> = recordings.iter().map(stroke).collect();
     all.sort_by(f64::total_cmp);
     let mut groups: Vec<Vec<f64>> = Vec::new();

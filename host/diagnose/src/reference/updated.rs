@@ -2,63 +2,30 @@
 
 use model_core::effects::FittedEffect;
 use model_core::table::MuscleTable;
-use pam_data::recording::Campaign;
+use pam_data::recording::{Campaign, Recording};
 use pam_fit::bench::Candidate;
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 
 use super::answer::{ChangeReport, Changed};
-use super::criteria::{SAME_STROKE, UPDATE_COVERED, UPDATE_LAWS, UPDATE_LEVELS, UPDATE_SAME_LEVEL};
+use super::criteria::{UPDATE_COVERED, UPDATE_LAWS, UPDATE_LEVELS};
+use super::motion::range;
+use super::runs::mountings;
 use super::shapes::{Change, Class};
+use super::strokes::levels;
 
 /// Whether recordings reach over what the table was tested at, so that a table can be fitted to them.
 pub(super) fn covers(after: &Campaign, table: &MuscleTable) -> bool {
     let rest = f64::from(table.geometry.rest_length.metres());
     let tested = &table.tested;
-    let spans = |of: &dyn Fn(usize) -> (f64, f64), low: f64, high: f64| {
-        let all = (0..after.recordings.len()).map(of);
-        let (least, most) =
-            all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
-        most - least >= UPDATE_COVERED * (high - low)
+    let spans = |column: &dyn Fn(&Recording) -> &[f64], wanted: f64| {
+        let values: Vec<f64> = after.recordings.iter().flat_map(column).copied().collect();
+        range(&values) >= UPDATE_COVERED * wanted
     };
-    let ends = |values: &[f64]| {
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
-    };
-    let pressures = spans(
-        &|i| ends(&after.recordings[i].pressure),
-        f64::from(tested.pressure_low.pascals()),
-        f64::from(tested.pressure_high.pascals()),
-    );
-    let strokes = spans(
-        &|i| ends(&after.recordings[i].stroke),
-        rest * f64::from(tested.contraction_low),
-        rest * f64::from(tested.contraction_high),
-    );
-    pressures && strokes && levels(after, f64::from(tested.pressure_high.pascals())) >= UPDATE_LEVELS
-}
-
-/// Pressures, or lengths, that were recorded: the larger number.
-fn levels(after: &Campaign, largest: f64) -> usize {
-    let distinct = |values: Vec<f64>, apart: f64| {
-        let mut sorted = values;
-        sorted.sort_by(f64::total_cmp);
-        let mut kept: Vec<f64> = Vec::new();
-        for v in sorted {
-            if kept.last().is_none_or(|k| v - k > apart) {
-                kept.push(v);
-            }
-        }
-        kept.len()
-    };
-    let middle = |values: &[f64]| {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied()
-    };
-    let of = |column: &dyn Fn(usize) -> Option<f64>| (0..after.recordings.len()).filter_map(column).collect();
-    let pressures = distinct(of(&|i| middle(&after.recordings[i].pressure)), UPDATE_SAME_LEVEL * largest);
-    let strokes = distinct(of(&|i| middle(&after.recordings[i].stroke)), SAME_STROKE);
-    pressures.max(strokes)
+    let pressures = f64::from(tested.pressure_high.pascals() - tested.pressure_low.pascals());
+    let strokes = rest * f64::from(tested.contraction_high - tested.contraction_low);
+    let conditions = levels(&[after]).len().max(mountings(&after.recordings).len());
+    spans(&|r| &r.pressure, pressures) && spans(&|r| &r.stroke, strokes) && conditions >= UPDATE_LEVELS
 }
 
 /// Whether a change is repaired at the bench: a slip of an end, and lost air.
@@ -106,7 +73,7 @@ fn law(candidate: Candidate, changed: &Changed, which: usize) -> Option<FittedEf
 }
 
 /// The table with all changes of the actuator. Recordings at held lengths give friction one size, and an effect may have several laws for it:
-/// the one that predicts AFTER best is taken.
+/// the one that predicts AFTER best is taken. Gives the rms of its error there, too, N.
 ///
 /// # Errors
 /// The name of the first change that a table has no place for.
@@ -114,7 +81,7 @@ pub(super) fn updated(
     file: &TableFile,
     report: &ChangeReport,
     after: &Campaign,
-) -> Result<TableFile, String> {
+) -> Result<(f64, TableFile), String> {
     let mut best: Option<(f64, TableFile)> = None;
     let mut without_place = String::new();
     for which in 0..UPDATE_LAWS {
@@ -129,5 +96,5 @@ pub(super) fn updated(
             best = Some((rms, new));
         }
     }
-    best.map(|(_, file)| file).ok_or(without_place)
+    best.ok_or(without_place)
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::injection::Slopes;
 use super::staircases::{Half, Muscle, Run};
 use super::{Answer, compared};
-use crate::clopper::interval;
+use crate::rate::Rate;
 
 /// Rates put in, 1/s: recorded leak-downs of fluidic muscles have 3e-4 to 1.5e-2.
 const RATES: [f64; 4] = [2e-3, 5e-3, 1e-2, 2e-2];
@@ -100,26 +100,14 @@ pub fn section(trials: &[Trial]) -> String {
         let other = own.iter().filter(|t| t.answer.named.iter().any(|n| n.0 != "leak")).count();
         let near = sizes.iter().filter(|(s, _)| (s / rate - 1.0).abs() < 0.2).count();
         let within = sizes.iter().filter(|(s, half)| (s - rate).abs() < *half).count();
-        let share = |k: usize, n: usize| {
-            let (low, high) = interval(k, n);
-            match n {
-                0 => "–".to_owned(),
-                _ => format!(
-                    "{k} of {n} = {:.0} % ({:.0}–{:.0})",
-                    100.0 * k as f64 / n as f64,
-                    100.0 * low,
-                    100.0 * high
-                ),
-            }
-        };
         let _ = writeln!(
             text,
             "| {rate} | {} | {compared} | {} | {} | {} | {} |",
             own.len(),
-            share(sizes.len(), compared),
-            share(other, own.len()),
-            share(near, sizes.len()),
-            share(within, sizes.len())
+            Rate::new(sizes.len(), compared),
+            Rate::new(other, own.len()),
+            Rate::new(near, sizes.len()),
+            Rate::new(within, sizes.len())
         );
     }
     text

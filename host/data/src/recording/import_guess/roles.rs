@@ -65,13 +65,17 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     named_length::find(others, &mut guess);
     stroke::judge(sample, others, &mut guess);
     absolute::ask(sample, &mut guess);
-    if !side_by_side::find(sample, &mut used, &mut guess) {
+    let several = side_by_side::find(sample, &mut used, &mut guess);
+    if !several {
         problems::incomplete_rows(sample, &mut guess);
     }
     problems::other_columns(sample, others, &mut guess);
     let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
     guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
-    what_is_missing(sample, &mut guess);
+    // Of recordings side by side that are not described nothing is.
+    if !several || guess.side_by_side.is_some() {
+        what_is_missing(sample, &mut guess);
+    }
     guess
 }
 
@@ -346,10 +350,6 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
-    // Nothing is described then.
-    if guess.unknown.iter().any(|u| u.contains("stand side by side")) {
-        return;
-    }
     let told = |guess: &Guess, quantity: Quantity| {
         let named = |c: &&SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == quantity);
         sample.columns.iter().filter(named).any(|c| guess.unknown.iter().any(|u| u.starts_with(&c.header)))
