@@ -25,7 +25,7 @@ use virtual_bench::recording::Row;
 use virtual_bench::rng::Rng;
 
 /// A way to record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The campaign that chooses its own steps.
@@ -127,6 +127,7 @@ pub fn ask(method: Method, made: &Made, recorded: &Recorded) -> Result<Said, Str
         bench_s: recorded.bench_s,
         choosing_s: recorded.choosing_s,
         ended: recorded.ended.clone(),
+        steps: recorded.recordings.iter().map(|r| r.name.clone()).collect(),
     })
 }
 
