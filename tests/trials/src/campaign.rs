@@ -60,6 +60,9 @@ pub struct Campaigns {
     /// Only this method; with `--development`.
     #[arg(long, requires = "development", conflicts_with = "short")]
     only: Option<Method>,
+    /// Only muscles in which this is hidden, once for each name; with `--development`.
+    #[arg(long, requires = "development")]
+    hidden: Vec<String>,
     /// Begin no further muscle after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
@@ -83,6 +86,9 @@ pub struct Said {
     /// What was recorded, in order.
     #[serde(default)]
     pub steps: Vec<String>,
+    /// Hidden effects that were considered and not named: the share of the misfit that each explains, and the reason.
+    #[serde(default)]
+    pub not_named: Vec<String>,
 }
 
 /// One muscle.
@@ -161,6 +167,9 @@ pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
     let mut specs = specs(what.muscles, if what.development { DEVELOPMENT } else { SEED });
     if what.short {
         specs.truncate(2);
+    }
+    if !what.hidden.is_empty() {
+        specs.retain(|s| s.effects.iter().any(|e| what.hidden.iter().any(|h| h == e.0.name)));
     }
     if what.tables {
         specs.retain(|s| s.stratum == Stratum::NullClean);
@@ -261,6 +270,7 @@ mod tests {
             choosing_s: 0.0,
             ended: String::new(),
             steps: Vec::new(),
+            not_named: Vec::new(),
         };
         let truth = ["leak".to_owned()];
         assert!(said(&[&["leak"]]).resolved(&truth));
