@@ -52,6 +52,8 @@ fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
             BenchName::Backlash => m.parameters[1] / 1e-5,
             BenchName::DisplacementOffset => m.parameters[0] / 1e-5,
             BenchName::CrossTalk => m.parameters[0] / 1e-6,
+            // Noise of 0.1 N.
+            BenchName::Gravity => m.parameters[0] / 1e-2,
             _ => m.parameters[0] / 2e-3,
         };
         assert!(size.abs() < 1.0, "{}: {}", m.fault.info().name, m.words);
