@@ -279,21 +279,20 @@ pub(crate) struct RowsOf {
     pub(crate) peak: Vec<f64>,
 }
 
-/// All columns at some of the moments that follow those that left the memories. The effects see all moments.
+/// All columns at moments that follow those that left the memories.
 pub(crate) fn columns_of_rows(
     table: &Table,
     library: &Library,
     contexts: &[Context<f64>],
-    kept: &[usize],
     places: &[Where],
     memories: &mut Memories,
 ) -> RowsOf {
     #[cfg(test)]
-    work::ROWS.set(work::ROWS.get() + kept.len());
+    work::ROWS.set(work::ROWS.get() + contexts.len());
     let m = table.len();
-    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(kept.len()); m];
-    for i in kept {
-        for (column, v) in columns.iter_mut().zip(table.row(&contexts[*i]).iter()) {
+    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(contexts.len()); m];
+    for c in contexts {
+        for (column, v) in columns.iter_mut().zip(table.row(c).iter()) {
             column.push(*v);
         }
     }
@@ -309,10 +308,10 @@ pub(crate) fn columns_of_rows(
                     }
                 }
                 peak.push(column.iter().map(|v| v.abs()).fold(0.0, f64::max));
-                columns.push(kept.iter().map(|i| column[*i]).collect());
+                columns.push(column);
             }
         }
     }
-    let matrix = DMatrix::from_fn(kept.len(), columns.len(), |i, j| columns[j][i]);
+    let matrix = DMatrix::from_fn(contexts.len(), columns.len(), |i, j| columns[j][i]);
     RowsOf { matrix, peak }
 }

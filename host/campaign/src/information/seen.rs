@@ -1,11 +1,13 @@
 //! The columns of everything recorded and of one step, beside a free table.
 
+use model_core::effects::Context;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use pam_data::recording::Recording;
+use pam_data::recording::{Campaign, Recording};
+use pam_diagnose::protocol_simulation::moments;
 
 use super::{Design, Past};
-use crate::columns::Where;
-use crate::criteria::{EFFECT_SIZE, STEP_ROWS};
+use crate::columns::{Where, columns_of_rows};
+use crate::criteria::EFFECT_SIZE;
 use crate::hypothesis::Hypothesis;
 use crate::left_over::LeftOver;
 
@@ -38,11 +40,23 @@ impl<'a> Seen<'a> {
         let mut peak = past.peak.clone();
         let mut together = None;
         if let Some(step) = step.filter(|s| !s.is_empty()) {
-            let parts = (&design.table, &design.library);
-            let (rows, added) = past.then(&step, &design.known, parts, STEP_ROWS);
+            let rows_before: usize = design.past.iter().map(Recording::len).sum();
+            let mut recordings = design.past.clone();
+            recordings.push(step);
+            let campaign = Campaign::new(recordings);
+            let contexts: Vec<Context<f64>> = moments(design.known.model, &campaign);
+            let mut memories = past.memories.clone();
+            let rows = columns_of_rows(
+                &design.table,
+                &design.library,
+                contexts.get(rows_before..)?,
+                &past.places,
+                &mut memories,
+            );
             for (p, of_step) in peak.iter_mut().zip(&rows.peak) {
                 *p = p.max(*of_step);
             }
+            let added = design.products(&rows, campaign.recordings.last().map(std::slice::from_ref)?);
             together = Some(LeftOver::of(&design.table, &(added + &past.gram))?);
         }
         let peak = peak.split_off(m);
