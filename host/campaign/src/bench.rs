@@ -160,6 +160,7 @@ impl Actuation for VirtualBench {
             CheckKind::DeadWeights => 0,
             CheckKind::RigidBar => 1,
             CheckKind::ReferenceGauge => 2,
+            CheckKind::Weighing => 3,
         };
         let made = checks::all(&self.spec, force, pressure, self.bench.clock());
         let seconds = check.seconds() + crate::criteria::HANDLING_S;

@@ -109,6 +109,8 @@ impl Table {
 
     /// The coefficients' precision, from products of columns.
     pub(crate) fn precision(&self, gram: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+        #[cfg(test)]
+        work::FACTORIZED.set(work::FACTORIZED.get() + 1);
         let m = self.len();
         let mut inner = gram.view((0, 0), (m, m)).into_owned();
         self.add_prior(&mut inner);
@@ -152,6 +154,19 @@ fn unseen(model: &Muscle<f64>, levels: &[f64], places: &Places) -> Vec<Context<f
         contexts.extend(moments(model, &Campaign::new(vec![r])));
     }
     contexts
+}
+
+/// What a design costs, counted in tests: these depend on no clock.
+#[cfg(test)]
+pub(crate) mod work {
+    use std::cell::Cell;
+
+    thread_local! {
+        /// How often the table was factorized.
+        pub(crate) static FACTORIZED: Cell<usize> = const { Cell::new(0) };
+        /// For how many rows the columns were computed.
+        pub(crate) static ROWS: Cell<usize> = const { Cell::new(0) };
+    }
 }
 
 /// One effect of the design, and the shapes that it is judged at.
@@ -272,6 +287,8 @@ pub(crate) fn columns_of_rows(
     places: &[Where],
     memories: &mut Memories,
 ) -> RowsOf {
+    #[cfg(test)]
+    work::ROWS.set(work::ROWS.get() + contexts.len());
     let m = table.len();
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(contexts.len()); m];
     for c in contexts {

@@ -8,17 +8,21 @@
 //! tables and effect h' can imitate, over everything recorded so far and the step. `exp(−d²/8)` is the Bhattacharyya coefficient of two
 //! normal distributions (K. Chaloner and I. Verdinelli, Statist. Sci. 10 (1995) 273, doi 10.1214/ss/1177009939, for designs of this kind).
 
+mod seen;
+
 use model_core::effects::Context;
 use model_core::muscle::Muscle;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::DMatrix;
 use pam_data::recording::{Campaign, Recording};
 use pam_diagnose::protocol_simulation::moments;
 use pam_fit::bench::{Candidate, Span};
 
+use self::seen::{Seen, View};
 use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
 use crate::course::Course;
 use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, WANTED_ERROR};
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
+use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
 use crate::step::{CheckKind, Step};
 
@@ -96,6 +100,8 @@ struct Past {
     gram: DMatrix<f64>,
     /// Largest value of each column.
     peak: Vec<f64>,
+    /// What the table leaves of them.
+    left: LeftOver,
 }
 
 impl<'a> Design<'a> {
@@ -119,7 +125,8 @@ impl<'a> Design<'a> {
         let (places, mut memories) = layout(&self.table, &self.library, &span);
         let rows = columns_of_rows(&self.table, &self.library, &contexts, &places, &mut memories);
         let gram = self.products(&rows, &campaign.recordings);
-        Some(Past { span, places, memories, gram, peak: rows.peak })
+        let left = LeftOver::of(&self.table, &gram)?;
+        Some(Past { span, places, memories, gram, peak: rows.peak, left })
     }
 
     /// Products of columns over rows of these recordings, each row with its weight.
@@ -140,16 +147,14 @@ impl<'a> Design<'a> {
         }
         let begin = self.past.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
         let step = simulated(&step.course(places), begin + PAUSE_S);
-        let Some(seen) = Seen::of(self, Some(step)) else { return Gain::default() };
-        self.compare(&seen.before, &seen.after, &seen)
+        Seen::of(self, Some(step)).map_or_else(Gain::default, |seen| self.compare(&seen))
     }
 
     /// What is known now: the predicted error of the table, N, and the expected entropy of the set if each effect in turn were there.
     #[must_use]
     pub fn now(&self) -> (f64, Vec<f64>) {
         let Some(seen) = Seen::of(self, None) else { return (f64::INFINITY, Vec::new()) };
-        let Some(precision) = self.table.precision(&seen.before) else { return (f64::INFINITY, Vec::new()) };
-        (rms(&self.table.errors(&precision)), self.doubts(&seen.before, &precision, &seen, &[]))
+        (rms(&seen.before.errors), self.doubts(&seen.before, &seen, &[]))
     }
 
     fn of_check(&self, check: CheckKind) -> Gain {
@@ -161,12 +166,10 @@ impl<'a> Design<'a> {
             };
             gain.set += entropy(set, |_, _| 0.0) - entropy(set, apart);
         }
-        if let Some(seen) = Seen::of(self, None)
-            && let Some(precision) = self.table.precision(&seen.before)
-        {
-            gain.error_before = rms(&self.table.errors(&precision));
+        if let Some(seen) = Seen::of(self, None) {
+            gain.error_before = rms(&seen.before.errors);
             gain.error_after = gain.error_before;
-            let doubts = |more: &[CheckKind]| self.doubts(&seen.before, &precision, &seen, more);
+            let doubts = |more: &[CheckKind]| self.doubts(&seen.before, &seen, more);
             gain.unseen = self.share() * less(&doubts(&[]), &doubts(&[check]));
         }
         gain
@@ -181,45 +184,33 @@ impl<'a> Design<'a> {
         self.known.sets.iter().flatten().any(|h| h.law == law)
     }
 
-    fn compare(&self, before: &DMatrix<f64>, after: &DMatrix<f64>, seen: &Seen<'_>) -> Gain {
-        let (Some(first), Some(second)) = (self.table.precision(before), self.table.precision(after)) else {
-            return Gain::default();
-        };
-        let (old, new) = (self.table.errors(&first), self.table.errors(&second));
+    fn compare(&self, seen: &Seen<'_>) -> Gain {
+        let (old, new) = (&seen.before.errors, &seen.after.errors);
         let wanted = (WANTED_ERROR * self.known.blocked).powi(2);
         let nats = |(a, b): (&f64, &f64)| 0.5 * ((a + wanted) / (b + wanted)).ln();
-        let mean = old.iter().zip(&new).map(nats).sum::<f64>() / old.len().max(1) as f64;
+        let mean = old.iter().zip(new).map(nats).sum::<f64>() / old.len().max(1) as f64;
         let mut gain = Gain {
             // Each level of the table counts once.
             table: (self.known.levels.len() as f64 * mean).max(0.0),
-            error_before: rms(&old),
-            error_after: rms(&new),
+            error_before: rms(old),
+            error_after: rms(new),
             ..Gain::default()
         };
         for (s, set) in self.known.sets.iter().enumerate() {
-            let old = entropy(set, |i, j| self.between(before, seen, s, i, j));
-            let new = entropy(set, |i, j| self.between(after, seen, s, i, j));
+            let old = self.distances(&seen.before, seen, s);
+            let new = self.distances(&seen.after, seen, s);
+            let (old, new) = (entropy(set, |i, j| old[(i, j)]), entropy(set, |i, j| new[(i, j)]));
             gain.set += (old - new).max(0.0);
         }
-        let (old, new) = (self.doubts(before, &first, seen, &[]), self.doubts(after, &second, seen, &[]));
+        let (old, new) = (self.doubts(&seen.before, seen, &[]), self.doubts(&seen.after, seen, &[]));
         gain.unseen = self.share() * less(&old, &new);
         gain
     }
 
     /// For each effect, the expected entropy of the set if it were present at the target size: among nothing and all others, whose sizes and
     /// shapes are free beside the table. Effects that a check of the bench settles are not competing candidates, and have none.
-    fn doubts(
-        &self,
-        gram: &DMatrix<f64>,
-        precision: &Cholesky<f64, Dyn>,
-        seen: &Seen<'_>,
-        more: &[CheckKind],
-    ) -> Vec<f64> {
-        let m = self.table.len();
-        let n = gram.nrows() - m;
-        let cross = gram.view((0, m), (m, n)).into_owned();
-        // What the table cannot imitate of the columns.
-        let left = gram.view((m, m), (n, n)) - cross.tr_mul(&precision.solve(&cross));
+    fn doubts(&self, view: &View, seen: &Seen<'_>, more: &[CheckKind]) -> Vec<f64> {
+        let (m, left) = (self.table.len(), &view.left);
         let size = (EFFECT_SIZE * self.known.blocked).powi(2);
         let settled = |law: Candidate| {
             let check = law.traits().check.and_then(CheckKind::of);
@@ -250,134 +241,38 @@ impl<'a> Design<'a> {
             .collect()
     }
 
-    /// Squared distance of one effect of a set from another, whose size and shape are free.
-    fn between(&self, gram: &DMatrix<f64>, seen: &Seen<'_>, set: usize, of: usize, from: usize) -> f64 {
-        let (a, b) = (&self.known.sets[set][of], &self.known.sets[set][from]);
+    /// Squared distances of each effect of a set from each other one, whose size and shape are free.
+    fn distances(&self, view: &View, seen: &Seen<'_>, set: usize) -> DMatrix<f64> {
+        let effects = &self.known.sets[set];
         let checked = |h: &Hypothesis| {
             h.law.traits().check.and_then(CheckKind::of).is_some_and(|c| self.known.checked.contains(&c))
         };
-        if checked(a) || checked(b) {
-            return DECIDED;
-        }
-        let Some(trace) = seen.traces.get(set).and_then(|t| t.get(of)) else { return 0.0 };
-        let Some(competitor) = self.library.index(b.law).map(|e| &seen.places[e]) else { return 0.0 };
         let m = self.table.len();
-        let mut least = f64::INFINITY;
-        for shape in &competitor.shapes {
-            let keep: Vec<usize> =
-                (0..m).chain(shape.iter().copied().filter(|c| seen.peak[*c] > 0.0)).collect();
-            let n = keep.len();
-            let mut inner = DMatrix::from_fn(n, n, |i, j| gram[(keep[i], keep[j])]);
-            self.table.add_prior(&mut inner);
-            for i in m..n {
-                inner[(i, i)] += 1.0 / (self.known.blocked * self.known.blocked);
+        let ridge = 1.0 / (self.known.blocked * self.known.blocked);
+        let shapes: Vec<Vec<Vec<usize>>> = effects
+            .iter()
+            .map(|h| {
+                let place = self.library.index(h.law).map(|e| &seen.places[e]);
+                let shown = |shape: &Vec<usize>| {
+                    shape.iter().map(|c| c - m).filter(|c| seen.peak[*c] > 0.0).collect()
+                };
+                place.iter().flat_map(|p| &p.shapes).map(shown).collect()
+            })
+            .collect();
+        let images = seen.traces[set].iter().map(|trace| Image::of(&view.left, trace));
+        let images: Vec<Image> = images.collect();
+        DMatrix::from_fn(effects.len(), effects.len(), |i, j| {
+            if i == j {
+                return 0.0;
             }
-            let image = gram * trace;
-            let cross = DVector::from_fn(n, |i, _| image[keep[i]]);
-            let Some(factor) = Cholesky::new(inner) else { continue };
-            least = least.min((trace.dot(&image) - cross.dot(&factor.solve(&cross))).max(0.0));
-        }
-        if least.is_finite() { least } else { 0.0 }
+            if checked(&effects[i]) || checked(&effects[j]) {
+                return DECIDED;
+            }
+            let nearest = shapes[j].iter().filter_map(|shape| images[i].distance(&view.left, shape, ridge));
+            let least = nearest.fold(f64::INFINITY, f64::min);
+            if least.is_finite() { least } else { 0.0 }
+        })
     }
-}
-
-/// The columns of everything recorded and a step, in products of columns that have the largest value 1.
-struct Seen<'a> {
-    /// Products over the past.
-    before: DMatrix<f64>,
-    /// Products over the past and the step.
-    after: DMatrix<f64>,
-    /// Where the columns of each effect are.
-    places: &'a [Where],
-    /// Largest value of each column before scaling; zero for a column without any.
-    peak: Vec<f64>,
-    /// For each set, the force of each hypothesis as coefficients of the columns.
-    traces: Vec<Vec<DVector<f64>>>,
-}
-
-impl<'a> Seen<'a> {
-    /// The past, and a step after it.
-    fn of(design: &'a Design<'_>, step: Option<Recording>) -> Option<Self> {
-        let past = design.shared.as_ref()?;
-        let mut peak = past.peak.clone();
-        let mut added = None;
-        if let Some(step) = step.filter(|s| !s.is_empty()) {
-            let rows_before: usize = design.past.iter().map(Recording::len).sum();
-            let mut recordings = design.past.clone();
-            recordings.push(step);
-            let campaign = Campaign::new(recordings);
-            let contexts: Vec<Context<f64>> = moments(design.known.model, &campaign);
-            let mut memories = past.memories.clone();
-            let rows = columns_of_rows(
-                &design.table,
-                &design.library,
-                contexts.get(rows_before..)?,
-                &past.places,
-                &mut memories,
-            );
-            for (p, of_step) in peak.iter_mut().zip(&rows.peak) {
-                *p = p.max(*of_step);
-            }
-            added = Some(design.products(&rows, campaign.recordings.last().map(std::slice::from_ref)?));
-        }
-        let scale: Vec<f64> = peak.iter().map(|p| if *p > 0.0 { 1.0 / p } else { 0.0 }).collect();
-        let scaled = |gram: &DMatrix<f64>| {
-            DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] * scale[i] * scale[j])
-        };
-        let before = scaled(&past.gram);
-        let after = added.map_or_else(|| before.clone(), |added| &before + scaled(&added));
-        let mut seen = Self { before, after, places: &past.places, peak, traces: Vec::new() };
-        seen.traces = design.known.sets.iter().map(|set| traces(design, &seen, set, &past.span)).collect();
-        Some(seen)
-    }
-}
-
-/// The force of each hypothesis of a set: the first as fitted, each other as it imitates the first best.
-fn traces(design: &Design<'_>, seen: &Seen<'_>, set: &[Hypothesis], span: &Span) -> Vec<DVector<f64>> {
-    let total = seen.peak.len();
-    let m = design.table.len();
-    let mut out: Vec<DVector<f64>> = Vec::with_capacity(set.len());
-    for hypothesis in set {
-        let mut trace = DVector::zeros(total);
-        let columns = design.library.index(hypothesis.law).map(|e| &seen.places[e]);
-        let Some(columns) = columns else {
-            out.push(trace);
-            continue;
-        };
-        match (&hypothesis.parameters, out.first()) {
-            (Some(values), None) => {
-                let amplitudes = hypothesis.law.amplitudes().len();
-                let shape =
-                    columns.nearest(hypothesis.law, values.get(amplitudes..).unwrap_or_default(), span);
-                for (c, value) in shape.iter().zip(values) {
-                    trace[*c] = value * seen.peak[*c];
-                }
-            }
-            (_, Some(first)) => {
-                let image = &seen.before * first;
-                let keep: Vec<usize> =
-                    columns.first_shape().copied().filter(|c| seen.peak[*c] > 0.0).collect();
-                let n = keep.len();
-                let mut inner = DMatrix::from_fn(n, n, |i, j| seen.before[(keep[i], keep[j])]);
-                for i in 0..n {
-                    inner[(i, i)] += 1e-9 + 1.0 / (design.known.blocked * design.known.blocked);
-                }
-                let cross = DVector::from_fn(n, |i, _| image[keep[i]]);
-                if let Some(factor) = Cholesky::new(inner) {
-                    let best = factor.solve(&cross);
-                    keep.iter().zip(best.iter()).for_each(|(c, v)| trace[*c] = *v);
-                }
-            }
-            (None, None) => {
-                if let Some(c) = columns.first_shape().next() {
-                    trace[*c] = EFFECT_SIZE * design.known.blocked;
-                }
-            }
-        }
-        debug_assert!(trace.rows(0, m).iter().all(|v| *v == 0.0));
-        out.push(trace);
-    }
-    out
 }
 
 fn rms(variances: &[f64]) -> f64 {
@@ -422,4 +317,52 @@ fn weights(recordings: &[Recording], independent_s: f64) -> Vec<f64> {
             std::iter::repeat_n((step / independent_s.max(1e-3)).min(1.0), r.len())
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
+
+    use virtual_bench::{bench::BenchSpec, presets};
+
+    use super::*;
+    use crate::bench::VirtualBench;
+    use crate::campaign::simulate;
+    use crate::columns::work;
+    use crate::engine::{Engine, Purpose};
+    use crate::hypothesis::candidates;
+    use crate::rig::Rig;
+
+    /// Table factorizations and rows of columns that it costs to weigh one step beside a set of this number of names.
+    fn cost_of_a_step(names: usize) -> (usize, usize) {
+        let spec = BenchSpec::laboratory(presets::miniature(), 1);
+        let muscle = pam_data::muscle_description::MuscleDescription::parse(&spec.muscle.description());
+        let mut engine = Engine::new(muscle.unwrap(), Rig::commanded(), Purpose::Fit, 180.0).unwrap();
+        simulate(&mut engine, &mut VirtualBench::new(&spec), None).unwrap();
+        let of = |law: Candidate| Hypothesis { law, weight: 1.0 / names as f64, parameters: None };
+        let set: Vec<Hypothesis> = candidates().into_iter().take(names).map(of).collect();
+        let (levels, sets) = (engine.places().levels(), [set]);
+        let known = Knowledge {
+            model: &engine.findings().unwrap().model,
+            past: engine.recordings(),
+            levels: &levels,
+            sigma: 0.1,
+            independent_s: 10.0,
+            blocked: engine.places().blocked,
+            sets: &sets,
+            checked: &[],
+        };
+        let design = Design::new(known, engine.places());
+        let before = (work::FACTORIZED.get(), work::ROWS.get());
+        let gain = design.gain(&Step::Speeds { level: levels[3] }, engine.places());
+        assert!(gain.total() > 0.0 && (names < 2 || gain.set > 0.0), "{gain:?}");
+        (work::FACTORIZED.get() - before.0, work::ROWS.get() - before.1)
+    }
+
+    #[test]
+    fn weighing_a_step_costs_the_same_however_many_names_are_possible() {
+        let (one, many) = (cost_of_a_step(1), cost_of_a_step(20));
+        assert_eq!((one.0, many.0), (1, 1));
+        assert!(one.1 > 0 && one.1 <= STEP_ROWS && many.1 == one.1, "{one:?} {many:?}");
+    }
 }

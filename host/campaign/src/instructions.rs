@@ -149,6 +149,11 @@ fn of_check(check: CheckKind) -> Vec<String> {
             "Set at least three pressures, each for some seconds.",
             "Record time_, pressure_ and reference_pressure_.",
         ],
+        CheckKind::Weighing => &[
+            "Vent the muscle. Read the load cell with the muscle and its fittings attached, and with nothing attached: in turn, at least \
+             twice each, each for some seconds.",
+            "Record time_, force_ and attached, which is 1 or 0.",
+        ],
     };
     lines.iter().map(|l| (*l).to_owned()).collect()
 }

@@ -38,6 +38,7 @@ pub mod hypothesis;
 pub mod information;
 pub mod instructions;
 pub mod journal;
+mod left_over;
 pub mod menu;
 pub mod places;
 pub mod prompt;

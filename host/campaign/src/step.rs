@@ -89,11 +89,13 @@ pub enum CheckKind {
     RigidBar,
     /// A better gauge beside the bench's own.
     ReferenceGauge,
+    /// The load cell with and without muscle and fittings.
+    Weighing,
 }
 
 impl CheckKind {
     /// All.
-    pub const ALL: [Self; 3] = [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge];
+    pub const ALL: [Self; 4] = [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge, Self::Weighing];
 
     /// The check of an effect's traits, where it is one of these.
     #[must_use]
@@ -102,6 +104,7 @@ impl CheckKind {
             BenchCheck::DeadWeights => Some(Self::DeadWeights),
             BenchCheck::RigidBar => Some(Self::RigidBar),
             BenchCheck::ReferenceGauge => Some(Self::ReferenceGauge),
+            BenchCheck::Weighing => Some(Self::Weighing),
             _ => None,
         }
     }
@@ -113,6 +116,7 @@ impl CheckKind {
             pam_fit::checks::Kind::DeadWeights => Self::DeadWeights,
             pam_fit::checks::Kind::RigidBar => Self::RigidBar,
             pam_fit::checks::Kind::ReferenceGauge => Self::ReferenceGauge,
+            pam_fit::checks::Kind::Weighing => Self::Weighing,
         }
     }
 
@@ -123,6 +127,7 @@ impl CheckKind {
             Self::DeadWeights => "dead_weights",
             Self::RigidBar => "rigid_bar",
             Self::ReferenceGauge => "gauge_check",
+            Self::Weighing => "weighing",
         }
     }
 
@@ -133,6 +138,7 @@ impl CheckKind {
             Self::DeadWeights => 84.0,
             Self::RigidBar => 120.0,
             Self::ReferenceGauge => 60.0,
+            Self::Weighing => 48.0,
         }
     }
 }
@@ -192,6 +198,7 @@ impl Step {
                 CheckKind::DeadWeights => "a check of the load cell with dead weights".into(),
                 CheckKind::RigidBar => "a check of the frame with a rigid bar".into(),
                 CheckKind::ReferenceGauge => "a check of the pressure sensor with a reference gauge".into(),
+                CheckKind::Weighing => "a check of the load cell with and without muscle and fittings".into(),
             },
         }
     }

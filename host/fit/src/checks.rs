@@ -4,6 +4,7 @@
 //! dead weights      F_read = (1 + γ) (W + c P) + o        known weights W on the cell, line vented and under pressure P
 //! rigid bar         x_read = x_bar − δ − F/K − b/2·sign F a bar in the muscle's place, pulled and pushed
 //! reference gauge   P_read = (1 + ν) P + q                a better gauge beside the bench's own
+//! weighing          F_read = a W + o                      the vented cell with (a = 1) and without (a = 0) muscle and fittings
 //! ```
 //! Loops of a muscle hardly separate a gain error of the load cell from that of the pressure sensor, or the frame's compliance from
 //! that of the braid: the table absorbs more than nine tenths of such an error. A check of one minute with a weight measures it. The
@@ -16,11 +17,13 @@
 //! | dead weights | `time_`, `force_`, `reference_force_`; with `pressure_` the thrust of the line shows |
 //! | rigid bar | `time_`, `displacement_`, `force_`, `reference_displacement_` |
 //! | reference gauge | `time_`, `pressure_`, `reference_pressure_` |
+//! | weighing | `time_`, `force_`, `attached`: 1 or 0 |
 
 mod dead_weights;
 mod gauge;
 mod rigid_bar;
 mod table;
+mod weighing;
 
 use std::path::Path;
 
@@ -40,6 +43,8 @@ pub enum Kind {
     RigidBar,
     /// A better gauge beside the bench's own.
     ReferenceGauge,
+    /// The load cell with and without muscle and fittings.
+    Weighing,
 }
 
 impl Kind {
@@ -52,6 +57,9 @@ impl Kind {
     }
 
     fn of_table(table: &Table) -> Result<Self> {
+        if table.attached().is_ok() {
+            return Ok(Self::Weighing);
+        }
         let kinds = [
             (Quantity::Force, Self::DeadWeights),
             (Quantity::Displacement, Self::RigidBar),
@@ -125,6 +133,7 @@ impl Checks {
                 Kind::DeadWeights => dead_weights::measure(&table)?,
                 Kind::RigidBar => rigid_bar::measure(&table)?,
                 Kind::ReferenceGauge => gauge::measure(&table)?,
+                Kind::Weighing => weighing::measure(&table)?,
             };
             for m in measured {
                 checks.measured.retain(|old| old.fault != m.fault);
@@ -156,7 +165,7 @@ pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
     };
     let (gain, thrust) = (of(BenchName::ForceGain, 0), of(BenchName::CrossTalk, 0));
     let (scale, give) = (of(BenchName::GaugeGain, 0), of(BenchName::RigCompliance, 0));
-    let offset = of(BenchName::DisplacementOffset, 0);
+    let (offset, mass) = (of(BenchName::DisplacementOffset, 0), of(BenchName::Gravity, 0));
     let mut freed = campaign.clone();
     for recording in &mut freed.recordings {
         for p in &mut recording.pressure {
@@ -164,7 +173,7 @@ pub fn freed(campaign: &Campaign, faults: &[Measured]) -> Campaign {
         }
         if let Some(force) = &mut recording.force {
             for (f, p) in force.iter_mut().zip(&recording.pressure) {
-                *f = *f / (1.0 + gain) - thrust * p;
+                *f = *f / (1.0 + gain) - thrust * p + weighing::GRAVITY * mass;
             }
             for (x, f) in recording.stroke.iter_mut().zip(force.iter()) {
                 // A pulling muscle draws the frame along.

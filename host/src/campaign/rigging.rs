@@ -76,6 +76,7 @@ pub(crate) fn emulated(
             CheckKind::DeadWeights => 0,
             CheckKind::RigidBar => 1,
             CheckKind::ReferenceGauge => 2,
+            CheckKind::Weighing => 3,
         };
         Ok(checks::all(&bench, force, pressure, clock).into_iter().nth(at).map(|c| c.csv))
     });

@@ -20,6 +20,7 @@ use pam_campaign::campaign::{Done, Outcome, run};
 use pam_campaign::engine::{Engine, Purpose};
 use pam_campaign::journal::Journal;
 use pam_campaign::rig::Rig;
+use pam_campaign::step::CheckKind;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
 use pam_device::emulated::Kind;
@@ -211,7 +212,7 @@ impl Arguments {
             .filter(|p| {
                 let name = p.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 let check =
-                    ["dead_weights", "rigid_bar", "gauge_check", "_spoiled"].iter().any(|c| name.contains(c));
+                    CheckKind::ALL.iter().any(|c| name.contains(c.file())) || name.contains("_spoiled");
                 name.ends_with(".csv") && !check
             })
             .collect();

@@ -53,8 +53,8 @@ pub struct Arguments {
     /// A table whose error on the recordings is reported; by default one is fitted.
     #[arg(long, value_name = "T.pam")]
     table: Option<PathBuf>,
-    /// A check of the bench (dead weights, rigid bar, reference gauge). The recordings are corrected for what it measures. May be given
-    /// more than once.
+    /// A check of the bench (dead weights, rigid bar, reference gauge, weighing). The recordings are corrected for what it measures.
+    /// May be given more than once.
     #[arg(long, value_name = "CHECK.csv")]
     check: Vec<PathBuf>,
     /// Effects that are known to be present, such as backlash. They are fitted and stored in the table in any case, no others are

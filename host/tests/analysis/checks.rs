@@ -46,12 +46,14 @@ fn refused(text: &str) -> String {
 #[test]
 fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
     let sound = read(&bench());
-    assert_eq!(sound.measured().len(), 6);
+    assert_eq!(sound.measured().len(), 7);
     for m in sound.measured().iter().filter(|m| m.fault != BenchName::RigCompliance) {
         let size = match m.fault {
             BenchName::Backlash => m.parameters[1] / 1e-5,
             BenchName::DisplacementOffset => m.parameters[0] / 1e-5,
             BenchName::CrossTalk => m.parameters[0] / 1e-6,
+            // Noise of 0.1 N.
+            BenchName::Gravity => m.parameters[0] / 1e-2,
             _ => m.parameters[0] / 2e-3,
         };
         assert!(size.abs() < 1.0, "{}: {}", m.fault.info().name, m.words);
@@ -80,6 +82,12 @@ fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
         assert!(off < 3.0 * std + 0.01 * truth.abs(), "{}: {} for {truth}", m.words, m.parameters[at]);
         assert!(std < 0.1 * truth.abs(), "{}: {std} of {truth}", m.words);
     }
+    // Alone: a weight in the load path loads the frame, and shows in what the rigid bar reads.
+    let mut heavy = bench();
+    heavy.rig.weight = 3.0;
+    let checks = read(&heavy);
+    let m = checks.measured().iter().find(|m| m.fault == BenchName::Gravity).expect("measured");
+    assert!(m.is_sure() && (m.parameters[0] + 3.0 / 9.806_65).abs() < 1e-2, "{}", m.words);
 }
 
 #[test]
@@ -96,6 +104,8 @@ fn bad_checks_are_refused_with_the_place_and_what_to_do() {
         (format!("time_s,force_N,reference_force_N\n{}0,1\n", rows("0,1,1\n")), "line 32"),
         (format!("time_s,force_N,reference_force_N\n{}", rows("0,1,1\n")), "at least three different"),
         (format!("time_s,pressure_kPa,reference_force_N\n{}", rows("0,1,1\n")), "no column `force_`"),
+        (format!("time_s,force_N,attached\n{}", rows("0,1,yes\n")), "line 2: `yes` is neither 1 nor 0"),
+        (format!("time_s,force_N,attached\n{}", rows("0,1,1\n")), "do not separate the weight"),
     ] {
         let error = refused(&text);
         assert!(error.contains(says), "{error}");
@@ -133,6 +143,40 @@ fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     // A bench that is sound leaves the muscle's diagnosis as it was.
     let sound = bench();
     assert!(asked(&sound, read(&sound)).missing.is_empty());
+}
+
+#[test]
+fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
+    let size = 0.04 * 120.0;
+    let (mut heavy, mut offset) = (bench(), bench());
+    heavy.rig.weight = size;
+    offset.instruments.force.offset = size;
+    for (bench, name) in [(heavy, "gravity"), (offset, "force-offset")] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let weighing: Vec<PathBuf> =
+            files(&bench, &folder).into_iter().filter(|f| f.ends_with("weighing.csv")).collect();
+        let muscle = Muscle::new(bench.muscle.clone());
+        let levels = campaigns::levels(&muscle);
+        // The vented readings before and after show the constant.
+        let mut protocol = campaigns::classic(&muscle, &levels);
+        let tare = campaigns::enriched(&muscle, &levels, 1).step[..3].to_vec();
+        protocol.step.splice(0..0, tare);
+        let recorded = Bench::new(&bench).run(&protocol).expect("a protocol for this muscle");
+        let campaign = Campaign::new(bench_campaign::recordings(&recorded));
+        let description = MuscleDescription::parse(&bench.muscle.description()).expect("a description");
+        let diagnosed = |checks: Checks| {
+            let options = Options { muscle: "mini".into(), checks, ..Options::default() };
+            diagnose(&campaign, &description.geometry(), &options).expect("a diagnosis").missing
+        };
+        let before = diagnosed(Checks::default());
+        let possible: Vec<&String> =
+            before.iter().flat_map(|m| std::iter::once(&m.effect).chain(&m.confusable_with)).collect();
+        assert!(possible.iter().any(|n| *n == "gravity") && possible.iter().any(|n| *n == "force-offset"));
+        let after = diagnosed(Checks::read(&weighing).expect("a check"));
+        let named: Vec<&str> = after.iter().map(|m| m.effect.as_str()).collect();
+        assert_eq!(named, [name]);
+        assert!(after[0].confusable_with.is_empty(), "{:?}", after[0].confusable_with);
+    }
 }
 
 /// Each stay at a weight is off by its own error, as a cell that creeps is: the rows of a stay repeat it.

@@ -1,7 +1,8 @@
-//! Checks of the bench without its muscle: dead weights on the load cell, a rigid bar in the muscle's place, a reference gauge.
+//! Checks of the bench without its muscle: dead weights on the load cell, a rigid bar in the muscle's place, a reference gauge, and the
+//! load cell with and without muscle and fittings.
 //!
 //! They are what protocol C of the catalogue adds: each shows one instrument against something known, and so splits what loops
-//! of the muscle confuse (gain of cell and gauge, cross-talk, what the frame gives, play).
+//! of the muscle confuse (gain of cell and gauge, cross-talk, what the frame gives, play, weight in the load path).
 
 use crate::bench::BenchSpec;
 use crate::rig::RigState;
@@ -24,12 +25,13 @@ const WITHIN: u32 = 10;
 /// Seconds at each weight and each pressure.
 const STAY: f64 = 6.0;
 
-/// All three checks of a bench, for forces up to `force` (N) and pressures up to `pressure` (Pa), done after `clock` (s).
+/// All checks of a bench, for forces up to `force` (N) and pressures up to `pressure` (Pa), done after `clock` (s).
 pub fn all(bench: &BenchSpec, force: f64, pressure: f64, clock: f64) -> Vec<Check> {
     vec![
         dead_weights(bench, force, pressure, clock),
         rigid_bar(bench, force, clock + 200.0),
         gauge(bench, pressure, clock + 400.0),
+        weighing(bench, clock + 600.0),
     ]
 }
 
@@ -124,6 +126,30 @@ fn gauge(bench: &BenchSpec, pressure: f64, clock: f64) -> Check {
         }
     }
     Check { name: "gauge_check", csv }
+}
+
+/// The vented cell with muscle and fittings attached and with nothing attached, in turn.
+fn weighing(bench: &BenchSpec, clock: f64) -> Check {
+    let (mut rig, mut cell) = (warm(bench, clock), channel(bench, "force"));
+    let mut csv = String::from("time_s,force_N,attached\n");
+    let mut t = clock;
+    for attached in [1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0] {
+        for i in 0..(STAY * RATE) as u32 {
+            for _ in 0..WITHIN {
+                let dt = 1.0 / RATE / f64::from(WITHIN);
+                t += dt;
+                let taken_off = (1.0 - attached) * bench.rig.weight;
+                let at = rig.at_cell(0.0, 0.0, 0.0, dt) - taken_off;
+                cell.follow(dt, at);
+            }
+            let f = cell.sample(1.0 / RATE);
+            // The first second swings.
+            if f64::from(i) >= RATE {
+                let _ = writeln!(csv, "{t:.3},{f:.4},{attached}");
+            }
+        }
+    }
+    Check { name: "weighing", csv }
 }
 
 #[cfg(test)]

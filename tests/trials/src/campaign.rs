@@ -57,6 +57,12 @@ pub struct Campaigns {
     /// Other muscles than the scored ones, for development; writes no page.
     #[arg(long, conflicts_with = "page")]
     development: bool,
+    /// Only this method; with `--development`.
+    #[arg(long, requires = "development", conflicts_with = "short")]
+    only: Option<Method>,
+    /// Only muscles in which this is hidden, once for each name; with `--development`.
+    #[arg(long, requires = "development")]
+    hidden: Vec<String>,
     /// Begin no further muscle after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
@@ -77,6 +83,12 @@ pub struct Said {
     pub choosing_s: f64,
     /// Why it ended.
     pub ended: String,
+    /// What was recorded, in order.
+    #[serde(default)]
+    pub steps: Vec<String>,
+    /// Hidden effects that were considered and not named: the share of the misfit that each explains, and the reason.
+    #[serde(default)]
+    pub not_named: Vec<String>,
 }
 
 /// One muscle.
@@ -146,21 +158,29 @@ fn specs(muscles: usize, seed: u64) -> Vec<Spec> {
 
 /// Runs the trials.
 pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
-    let folder = what.output.join(if what.tables { "tables" } else { "campaigns" });
+    let folder = what.output.join(match (what.tables, what.only) {
+        (true, _) => "tables".to_owned(),
+        (false, Some(only)) => format!("campaigns-{only:?}").to_lowercase(),
+        (false, None) => "campaigns".to_owned(),
+    });
     std::fs::create_dir_all(&folder)?;
     let mut specs = specs(what.muscles, if what.development { DEVELOPMENT } else { SEED });
     if what.short {
         specs.truncate(2);
+    }
+    if !what.hidden.is_empty() {
+        specs.retain(|s| s.effects.iter().any(|e| what.hidden.iter().any(|h| h == e.0.name)));
     }
     if what.tables {
         specs.retain(|s| s.stratum == Stratum::NullClean);
     }
     let begun = Instant::now();
     let over = || what.minutes.is_some_and(|m| begun.elapsed().as_secs_f64() > 60.0 * m);
-    let methods: &[Method] = match (what.tables, what.short) {
-        (true, _) => &[],
-        (false, true) => &[Method::Chosen],
-        (false, false) => &Method::ALL,
+    let methods: &[Method] = match (what.tables, what.short, &what.only) {
+        (true, ..) => &[],
+        (false, true, _) => &[Method::Chosen],
+        (false, false, Some(only)) => std::slice::from_ref(only),
+        (false, false, None) => &Method::ALL,
     };
     let progress = Progress::new("campaigns", specs.len());
     let done = in_order(&specs, |spec| {
@@ -174,7 +194,7 @@ pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
             return Ok(None);
         }
         let bench_s = if what.short { SHORT_BENCH_S } else { BENCH_S };
-        let trial = one(spec, methods, bench_s, !what.short)?;
+        let trial = one(spec, methods, bench_s, !what.short && what.only.is_none())?;
         let text = serde_json::to_string_pretty(&trial).map_err(|e| e.to_string())?;
         std::fs::write(&path, text).map_err(|e| e.to_string())?;
         progress.one();
@@ -249,6 +269,8 @@ mod tests {
             bench_s: 1.0,
             choosing_s: 0.0,
             ended: String::new(),
+            steps: Vec::new(),
+            not_named: Vec::new(),
         };
         let truth = ["leak".to_owned()];
         assert!(said(&[&["leak"]]).resolved(&truth));

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use pam_data::recording::Recording;
+use pam_fit::bench::Candidate;
 use rayon::prelude::*;
 
 use super::Engine;
@@ -50,7 +51,15 @@ impl Engine {
     /// Before there is a table nothing can be weighed: then the steps that were not made come in the order of the menu.
     #[must_use]
     pub fn rank(&self, left_s: f64, planned: &[(Step, Option<Recording>)]) -> Ranking {
+        // Weighing settles only what the diagnosis must have named: the recordings show every constant force at the tares.
+        let settles =
+            |law: Candidate| law.traits().check.and_then(CheckKind::of) == Some(CheckKind::Weighing);
+        let open = self.diagnosis.as_ref().map(sets).unwrap_or_default();
+        let constant_force = open.iter().flatten().any(|h| settles(h.law));
         let follows = |step: &Step| {
+            if *step == (Step::Check { check: CheckKind::Weighing }) && !constant_force {
+                return false;
+            }
             let again = match step {
                 Step::Check { .. } => planned.iter().any(|p| p.0 == *step),
                 Step::Tare { .. } => matches!(planned.last(), Some((Step::Tare { .. }, _))),

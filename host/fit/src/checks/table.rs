@@ -9,6 +9,8 @@ use pam_data::recording::{Named, Quantity, named};
 
 /// The prefix of the column that holds the reference.
 const REFERENCE: &str = "reference_";
+/// The column of a check by weighing: 1 where muscle and fittings hang on the cell, 0 where nothing does.
+const ATTACHED: &str = "attached";
 /// The smallest number of rows of a check.
 const FEWEST: usize = 20;
 
@@ -17,6 +19,8 @@ pub(super) struct Table {
     file: PathBuf,
     /// Quantity, whether it is the reference, values in SI.
     columns: Vec<(Quantity, bool, Vec<f64>)>,
+    /// Whether muscle and fittings hang on the cell; empty without the column.
+    attached: Vec<f64>,
 }
 
 impl Table {
@@ -35,6 +39,8 @@ impl Table {
         let header = reader.headers().map_err(|e| damaged(&e))?.clone();
         let mut columns = Vec::new();
         let mut wanted = Vec::new();
+        let attached_at = header.iter().position(|name| name == ATTACHED);
+        let mut attached = Vec::new();
         for (at, name) in header.iter().enumerate() {
             let (reference, name) = name.strip_prefix(REFERENCE).map_or((false, name), |n| (true, n));
             match named(name) {
@@ -56,6 +62,16 @@ impl Table {
         for row in reader.records() {
             let row = row.map_err(|e| damaged(&e))?;
             let line = row.position().map_or(0, csv::Position::line);
+            if let Some(at) = attached_at {
+                attached.push(match &row[at] {
+                    "0" => 0.0,
+                    "1" => 1.0,
+                    other => {
+                        let told = format!("line {line}: `{other}` is neither 1 nor 0 for `{ATTACHED}`");
+                        return Err(Error::new(DataCode::CheckInvalid, told).file(file));
+                    }
+                });
+            }
             for ((at, unit), column) in wanted.iter().zip(&mut columns) {
                 let value: Option<f64> = row[*at].parse().ok().filter(|v: &f64| v.is_finite());
                 let Some(value) = value else {
@@ -68,7 +84,7 @@ impl Table {
                 column.2.push(value * unit.scale + unit.offset);
             }
         }
-        let table = Self { file: file.to_owned(), columns };
+        let table = Self { file: file.to_owned(), columns, attached };
         let rows = table.columns.first().map_or(0, |c| c.2.len());
         if rows < FEWEST {
             return Err(table.poor(format!("{}; a check needs at least {FEWEST}", pluralise(rows, "row"))));
@@ -97,6 +113,11 @@ impl Table {
         found.map(|c| c.2.as_slice()).ok_or_else(|| self.missing(REFERENCE, quantity))
     }
 
+    /// Whether muscle and fittings hang on the cell, 1 or 0 by row.
+    pub(super) fn attached(&self) -> Result<&[f64]> {
+        if self.attached.is_empty() { Err(self.without_reference()) } else { Ok(&self.attached) }
+    }
+
     /// Whether the known quantity is this one.
     pub(super) fn has_reference(&self, quantity: Quantity) -> bool {
         self.reference(quantity).is_ok()
@@ -113,7 +134,7 @@ impl Table {
     pub(super) fn without_reference(&self) -> Error {
         Error::new(DataCode::CheckInvalid, "there is no column of the reference")
             .file(&self.file)
-            .help("a check has `reference_force_N`, `reference_displacement_mm` or `reference_pressure_kPa` beside the reading")
+            .help("a check has `reference_force_N`, `reference_displacement_mm`, `reference_pressure_kPa` or `attached` beside the reading")
     }
 
     /// The error of a check that determines nothing.

@@ -39,7 +39,9 @@ fn bench_check(check: BenchCheck) -> &'static str {
             "compare the gauge with a reference at three pressures, and close the valve for a minute"
         }
         BenchCheck::VentedLength => "measure the vented length with a calliper before and after",
-        BenchCheck::Weighing => "weigh the muscle, and record the vented load cell before and after",
+        BenchCheck::Weighing => {
+            "read the vented load cell with muscle and fittings attached, and with nothing attached, in turn"
+        }
         BenchCheck::EndsAndDiameter => "photograph the ends and measure the diameter at three pressures",
     }
 }

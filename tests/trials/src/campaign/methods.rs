@@ -15,6 +15,7 @@ use pam_campaign::step::{CheckKind, Step};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 use pam_diagnose::next_experiment::next_experiment;
+use pam_diagnose::verdict::Considered;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use virtual_bench::bench::Bench;
@@ -25,7 +26,7 @@ use virtual_bench::recording::Row;
 use virtual_bench::rng::Rng;
 
 /// A way to record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The campaign that chooses its own steps.
@@ -120,13 +121,21 @@ pub fn ask(method: Method, made: &Made, recorded: &Recorded) -> Result<Said, Str
         .iter()
         .map(|m| std::iter::once(&m.effect).chain(&m.confusable_with).cloned().collect())
         .collect();
+    let why_not = |c: &Considered| format!("{} {:.3} {:?}", c.effect, c.gain, c.why_not);
     Ok(Said {
         method,
+        not_named: d
+            .considered
+            .iter()
+            .filter(|c| made.truth.effects.iter().any(|e| e.name == c.effect))
+            .map(why_not)
+            .collect(),
         sets,
         rows: recorded.recordings.iter().map(Recording::len).sum(),
         bench_s: recorded.bench_s,
         choosing_s: recorded.choosing_s,
         ended: recorded.ended.clone(),
+        steps: recorded.recordings.iter().map(|r| r.name.clone()).collect(),
     })
 }
 
