@@ -71,7 +71,7 @@ pub(super) struct Found {
     /// The largest force that the memory makes, N.
     pub peak: f64,
     /// Friction that unseen runs need beside the memory.
-    pub friction: Option<friction::Needed>,
+    friction: Option<friction::Needed>,
 }
 
 /// All fits of a campaign.

@@ -72,10 +72,11 @@ fn beside(fits: &Fits<'_>) -> String {
         * half_width_95(unseen.folds.len().saturating_sub(1))
         * n.peak;
     format!(
-        "; beside it {} of up to {:.1} ± {half:.1} N lowers the squared error of unseen runs by {:.0} %",
+        "; beside it {} of up to {:.1} ± {half:.1} N lowers the error of unseen runs from {:.2} to {:.2} N (rms)",
         n.name.effect.info().name,
         n.peak,
-        100.0 * n.gain
+        n.rms.0,
+        n.rms.1
     )
 }
 
