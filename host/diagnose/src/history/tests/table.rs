@@ -153,7 +153,7 @@ fn friction_that_grows_with_the_radius_is_in_the_table() {
 #[test]
 fn friction_of_constant_size_is_in_the_table() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
-    let strand = 0.2;
+    let strand = 0.6;
     let campaign = campaign_of(&[
         FittedEffect::new(EffectName::BladderCreep, &TRUTH),
         FittedEffect::new(EffectName::CoulombFriction, &[0.0, strand]),
