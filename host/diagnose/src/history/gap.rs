@@ -65,7 +65,8 @@ pub(super) fn finding(points: &Points, fits: &Fits<'_>, visits: &Visits, named: 
 /// Friction beside the memory, as text.
 fn beside(fits: &Fits<'_>) -> String {
     let Some(n) = fits.friction.needed.as_ref() else {
-        return "; dry friction beside it lowers the error of unseen runs by no more than chance".to_owned();
+        return "; dry friction beside it does not lower the error of unseen runs by enough to be named"
+            .to_owned();
     };
     let (_, unseen) = fits.best();
     let half = n.error / n.value.abs().max(f64::MIN_POSITIVE)
