@@ -174,7 +174,7 @@ fn friction(campaign: &Campaign) -> Option<Needed> {
     found(campaign, &geometry()).expect("a campaign of staircases").friction
 }
 
-/// The same campaign by one clock, which tells the pauses.
+/// The same campaign by one clock, which gives the pauses.
 fn clocked(truth: Truth, seed: u64) -> Campaign {
     let mut campaign = campaign(truth, seed);
     for (run, recording) in campaign.recordings.iter_mut().enumerate() {
