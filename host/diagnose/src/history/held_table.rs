@@ -38,7 +38,7 @@ struct Places {
     gamma: usize,
     /// `π`.
     deadband: usize,
-    /// The first amplitude: those of the memory, on which `k_F` acts, then those of dry friction.
+    /// The first amplitude: those of the memory, on which `k_F` acts, then those of the friction that follows pressure.
     layers: usize,
     /// How many amplitudes the memory has.
     memory: usize,
@@ -46,13 +46,12 @@ struct Places {
     friction: usize,
 }
 
-const AT: Places = Places { gamma: 0, deadband: 1, layers: 2, memory: 3, friction: 8 };
+const AT: Places = Places { gamma: 0, deadband: 1, layers: 2, memory: 3, friction: 7 };
 
-/// Amplitudes: three of the memory; of the friction that follows pressure `μ` with `μ_0 = −μ`, which is none at rest length, and `μ_0` alone;
-/// of constant friction `F_s`.
-pub(super) type Amplitudes = [f64; 6];
+/// Amplitudes: three of the memory; of the friction that follows pressure `μ` with `μ_0 = −μ`, which is none at rest length, and `μ_0` alone.
+pub(super) type Amplitudes = [f64; 5];
 /// Which amplitudes are fitted.
-pub(super) type Open = [bool; 6];
+pub(super) type Open = [bool; 5];
 
 /// What is fitted, and beside which table.
 pub(super) struct Problem<'a> {
@@ -346,12 +345,11 @@ pub(super) fn predicts_better(with: &[f64], without: &[f64]) -> bool {
 impl Solution {
     /// The table with the layers that have a share.
     pub(super) fn with_layers(&self, width: f64) -> MuscleTable {
-        let [c, b, d, growing, constant, strand] = self.amplitudes;
+        let [c, b, d, growing, constant] = self.amplitudes;
         let mut table = self.table.clone();
         let layers = [
             FittedEffect::new(EffectName::BladderCreep, &[c, b, d, width]),
             FittedEffect::new(EffectName::PressureFriction, &[growing, constant - growing]),
-            FittedEffect::new(EffectName::CoulombFriction, &[0.0, strand]),
         ];
         for layer in layers {
             if layer.parameters[..layer.effect.info().amplitudes()].iter().any(|a| *a != 0.0) {

@@ -158,7 +158,7 @@ impl<'a> Prepared<'a> {
         file
     }
 
-    /// The table with some layers: the contact, and friction that follows pressure or stays, where runs that are left out ask for them.
+    /// The table with some layers: the contact, and friction that follows pressure, where runs that are left out ask for them.
     ///
     /// # Errors
     /// Recordings that cannot be fitted.
@@ -173,7 +173,7 @@ impl<'a> Prepared<'a> {
         for (width, contact) in
             widths.filter(|(width, contact)| memory || *contact || *width == TABLE_WIDTHS[0])
         {
-            let open = [memory, memory, contact, false, false, false];
+            let open = [memory, memory, contact, false, false];
             let better = |s: &Solution| best.as_ref().is_none_or(|b| s.squares < b.solution.squares);
             let found = self.rounds(&problem, Assumed { open, width, earlier_load: None })?;
             if let Some(found) = found.filter(|f| possible(&f.solution) && better(&f.solution)) {
@@ -181,19 +181,12 @@ impl<'a> Prepared<'a> {
             }
         }
         let Some(mut best) = best else { return Ok(self.base()) };
-        let assumed = best.assumed;
-        let [wall, growing, contact, ..] = assumed.open;
-        let plain = best.left_out(&problem);
-        let mut least = f64::INFINITY;
-        for [pressed, constant] in [[true, false], [false, true]] {
-            let open = [wall, growing, contact, pressed, pressed, constant];
-            let Some(found) = self.rounds(&problem, Assumed { open, ..assumed })? else { continue };
-            let errors = found.left_out(&problem);
-            let sum = errors.iter().sum::<f64>();
-            if possible(&found.solution) && sum < least && predicts_better(&errors, &plain) {
-                least = sum;
-                best = found;
-            }
+        let [wall, growing, contact, ..] = best.assumed.open;
+        let open = [wall, growing, contact, true, true];
+        if let Some(found) = self.rounds(&problem, Assumed { open, ..best.assumed })?
+            && predicts_better(&found.left_out(&problem), &best.left_out(&problem))
+        {
+            best = found;
         }
         // Last, as no recording shows it: effects that the recordings show come first.
         if memory {
@@ -238,8 +231,6 @@ impl<'a> Prepared<'a> {
             columns.push(now.iter().zip(&at_rest).map(|(now, at_rest)| now - at_rest).collect());
             columns.push(at_rest);
         }
-        // At held length the strands alone rub, not what turns with the stroke.
-        columns.extend(effect_columns(file, &self.loaded, EffectName::CoulombFriction, &[])?.pop());
         Ok(columns)
     }
 

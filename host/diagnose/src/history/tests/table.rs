@@ -151,20 +151,6 @@ fn friction_that_grows_with_the_radius_is_in_the_table() {
 }
 
 #[test]
-fn friction_of_constant_size_is_in_the_table() {
-    let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
-    let strand = 0.6;
-    let campaign = campaign_of(&[
-        FittedEffect::new(EffectName::BladderCreep, &TRUTH),
-        FittedEffect::new(EffectName::CoulombFriction, &[0.0, strand]),
-    ]);
-    let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
-    let found = file.table.effects.iter().find(|e| e.effect == EffectName::CoulombFriction);
-    let found = f64::from(found.expect("named").parameters[1]);
-    assert!((found / strand - 1.0).abs() < 0.2, "{found}");
-}
-
-#[test]
 fn what_the_tables_numbers_scatter_by_is_stored_with_them() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let file = table_fit::table(&campaign(&TRUTH), &muscle).expect("fitted").expect("staircases");
