@@ -14,6 +14,8 @@
 //! | [`table_unseen`] | each run predicted from the others by tables |
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
+//! | `friction` | dry friction beside the memory, and in place of its fast part |
+//! | `gap` | the gap between filling and emptying, and its cause |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
 //! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
 //! | `judge` | rules of the verdict |
@@ -26,6 +28,8 @@ pub mod answer;
 mod campaign;
 mod enter;
 mod findings;
+mod friction;
+mod gap;
 mod held_table;
 mod judge;
 mod law;
@@ -48,10 +52,11 @@ use model_core::braid::Geometry;
 use pam_data::recording::Campaign;
 
 use self::campaign::Points;
-use self::criteria::{KEPT_ERRORS, MEMORY_KEPT_GAIN, MEMORY_SINGLE_TIMES, TIMES};
+use self::friction::Friction;
+use self::criteria::{MEMORY_SINGLE_TIMES, TIMES};
 use self::law::{Law, Layer};
 use self::run_offset::Event;
-use self::unseen::{Unseen, jackknife};
+use self::unseen::Unseen;
 use super::verdict::Region;
 pub(crate) use crate::criteria::history as criteria;
 
@@ -65,6 +70,8 @@ pub(super) struct Found {
     pub shifts: Vec<(Vec<f64>, Vec<f64>)>,
     /// The largest force that the memory makes, N.
     pub peak: f64,
+    /// Friction that unseen runs need beside the memory.
+    friction: Option<friction::Needed>,
 }
 
 /// All fits of a campaign.
@@ -83,8 +90,7 @@ struct Fits<'a> {
     with_slips: Option<(Law, Unseen)>,
     /// Unseen errors with the slips alone.
     slips_alone: Option<Unseen>,
-    /// Friction beside the memory: whether it is kept, its coefficient and standard error.
-    friction: (bool, f64, f64),
+    friction: Friction,
     /// Unseen error of the best law with one time constant over that of the spectrum, rms.
     single: f64,
 }
@@ -99,12 +105,13 @@ impl Fits<'_> {
 /// The history of a campaign; `None` where it is none of isometric staircases with repeated runs.
 #[must_use]
 pub fn history(campaign: &Campaign, geometry: &Geometry) -> Option<History> {
-    found(campaign, geometry.rest_length.metres()).map(|f| f.answer)
+    found(campaign, geometry).map(|f| f.answer)
 }
 
-pub(super) fn found(campaign: &Campaign, rest_length: f64) -> Option<Found> {
+pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
+    let rest_length = geometry.rest_length.metres();
     let points = campaign::points(campaign, rest_length)?;
-    let fits = fits(&points);
+    let fits = fits(&points, geometry);
     let answer = judge::answer(&points, &fits, campaign, rest_length);
     let (law, _) = fits.best();
     let peak = (0..points.len())
@@ -122,10 +129,11 @@ pub(super) fn found(campaign: &Campaign, rest_length: f64) -> Option<Found> {
         })
         .collect();
     let regions = places::regions(&points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
-    Some(Found { answer, regions, shifts, peak })
+    let needed = fits.friction.needed.clone();
+    Some(Found { answer, regions, shifts, peak, friction: needed })
 }
 
-fn fits(points: &Points) -> Fits<'_> {
+fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
     let layer = Layer::new(points, &TIMES);
     let everything = vec![true; points.len()];
     let law = layer.fit(&everything, None, &[], None);
@@ -147,7 +155,7 @@ fn fits(points: &Points) -> Fits<'_> {
     let slips_alone =
         (!steps.is_empty()).then(|| unseen::shifted_curves(&layer, &steps, &vec![0.0; steps.len()]).0);
     let (reported, seen) = with_slips.as_ref().map_or((&law, &memory), |(l, u)| (l, u));
-    let friction = friction(&layer, reported, seen, &steps);
+    let friction = friction::of(&layer, reported, seen, &steps, geometry);
     let single = single_time(points, &law, &memory);
     Fits {
         by_direction: unseen::static_curves(points, true),
@@ -162,28 +170,6 @@ fn fits(points: &Points) -> Fits<'_> {
         friction,
         single,
     }
-}
-
-/// Whether friction, as a loss of pressure in proportion to the pull's onset, lowers the error that the memory leaves.
-fn friction(layer: &Layer<'_>, law: &Law, memory: &Unseen, steps: &[Vec<f64>]) -> (bool, f64, f64) {
-    let points = layer.points;
-    let rubs = |i: usize| {
-        let onset = layer.thresholds[points.mounting[i]].max(0.0);
-        -f64::from(points.direction[i]) * points.pressure[i].clamp(0.0, onset)
-    };
-    let mut columns = steps.to_vec();
-    columns.push((0..points.len()).map(rubs).collect());
-    let start = Law { fit: run_offset::with_room(law), ..law.clone() };
-    let with = layer.fit(&vec![true; points.len()], Some(law.choice), &columns, Some(&start));
-    let unseen = unseen::with_memory(layer, &with, &columns, true);
-    let last = |law: &Law| law.fit.theta.last().copied().unwrap_or(0.0);
-    let error = jackknife(&unseen.folds.iter().map(last).collect::<Vec<_>>());
-    let supported = points.supported();
-    let counts = |i: usize| supported[i];
-    let (before, after) = (memory.sizes(points, counts).rms, unseen.sizes(points, counts).rms);
-    let value = last(&with);
-    let kept = after.powi(2) <= (1.0 - MEMORY_KEPT_GAIN) * before.powi(2) && value > KEPT_ERRORS * error;
-    (kept, value, error)
 }
 
 /// See [`Fits::single`].

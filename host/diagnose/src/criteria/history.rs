@@ -71,6 +71,10 @@ pam_data::criteria! {
     MEMORY_KEPT_GAIN: f64 = 0.1, "g_k", "1", Measured("chosen on six muscles");
     /// And when its coefficient is this many standard errors.
     KEPT_ERRORS: f64 = 3.0, "t_k", "1", Measured("chosen on six muscles");
+    /// Least slope of a mounting's curve, as a share of the steepest, by which a friction force becomes a shift of pressure.
+    LEAST_AREA: f64 = 0.3, "a_min", "1", Derived("a braid's area at two thirds of its largest contraction, strands 29° from the axis");
+    /// The memory is the cause of the gap between filling and emptying if it takes at least this share of it.
+    GAP_EXPLAINED: f64 = 0.5, "g_gap", "1", Derived("most of it");
     /// A settled point pulls above this share of the largest force.
     PULLS: f64 = 0.0125, "f_p", "1", Derived("5 N of 400 N, above the offset of a load cell between sessions");
     /// Contrasts interpolate between points at most this many knots apart.

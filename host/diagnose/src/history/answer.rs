@@ -162,6 +162,9 @@ pub struct Finding {
     pub squares: f64,
     /// The effect that explains it; absent where none does.
     pub cause: Option<String>,
+    /// Effects that explain as well what the cause does within a run.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<String>,
     /// Number of the mounting, from 1, where it is about one.
     pub mounting: Option<usize>,
     /// Number of the run within the mounting, from 1, where it is about one.

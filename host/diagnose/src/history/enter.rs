@@ -3,6 +3,7 @@
 use model_core::braid::{Braid, Geometry};
 
 use super::criteria::{ENTER_EXPLAINED, ENTER_REFUTES, ENTER_RESOLVED, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN};
+use super::friction::{self, Needed};
 use super::{Found, History, found};
 use crate::baselines::{self, Kind};
 use crate::diagnosis::diagnose as statically;
@@ -10,6 +11,7 @@ use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;
 use crate::verdict::{Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why};
+use crate::why::{Chance, Evidence};
 use model_core::effects::EffectName;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
@@ -33,7 +35,7 @@ pub fn is_from_history(missing: &Missing) -> bool {
 /// Recordings without force or without rows, or an impossible geometry.
 pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
     options.progress.stage("what the muscle remembers", 0);
-    let Some(found) = found(campaign, geometry.rest_length.metres()) else {
+    let Some(found) = found(campaign, geometry) else {
         return statically(campaign, geometry, options);
     };
     // What the user gives as known is fitted as it is, to the recordings as they are.
@@ -80,13 +82,20 @@ fn misfit(campaign: &Campaign, braid: &Braid<f64>) -> Result<Option<f64>> {
 }
 
 fn enter(diagnosis: &mut Diagnosis, found: Found) {
-    let Found { answer, regions, peak, .. } = found;
+    let Found { answer, regions, peak, friction, .. } = found;
     let unseen = &answer.unseen;
     let left = (1.0 - unseen.gain).clamp(0.0, 1.0);
     let resolved = unseen.supported_with.rms_N <= ENTER_RESOLVED * answer.largest_force_N;
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
+    let known = |n: &Needed| {
+        let says = |effect: &str| effect == n.name.effect.info().name;
+        diagnosis.missing.iter().any(|m| says(&m.effect) || m.confusable_with.iter().any(|c| says(c)))
+    };
+    if let Some(n) = friction.filter(|n| !known(n)) {
+        diagnosis.missing.insert(1, rubbing(&n, left));
+    }
     let freed_misfit = diagnosis.misfit_rms_N;
     let rest_agrees =
         !diagnosis.judged() || matches!(diagnosis.verdict(), Verdict::Consistent | Verdict::Explained);
@@ -172,5 +181,44 @@ fn memory(history: &History, peak: f64) -> Missing {
             least_gain: LEAST_GAIN,
             one_time_constant_ratio: history.law.one_time_constant_ratio,
         },
+    }
+}
+
+/// Friction beside the memory as an entry of what is missing. `left` is the share of the squared error that the memory leaves.
+fn rubbing(needed: &Needed, left: f64) -> Missing {
+    let info = needed.name.effect.info();
+    let probability = if needed.confusable.is_empty() { ENTER_SURE } else { ENTER_UNSURE };
+    let share = (left * needed.gain).clamp(0.0, 1.0);
+    let parameters = info.parameters.iter().enumerate().map(|(k, parameter)| {
+        let value = if k == needed.name.amplitude { needed.value } else { 0.0 };
+        ParameterValue {
+            name: parameter.name.into(),
+            value,
+            std: (value != 0.0).then_some(needed.error),
+            unit: parameter.unit.into(),
+            outside_known_range: ParameterValue::is_outside(value, parameter),
+        }
+    });
+    Missing {
+        effect: info.name.into(),
+        probability,
+        model_weight: probability,
+        share_explained: share,
+        parameters: parameters.collect(),
+        confusable_with: needed.confusable.iter().map(|e| e.info().name.to_owned()).collect(),
+        place: info.link,
+        correction: false,
+        checked: false,
+        given: false,
+        supported: true,
+        summary: info.summary.into(),
+        source: info.source.into(),
+        peak_N: needed.peak,
+        p: needed.chance,
+        why: Why::Found(Evidence {
+            share,
+            chance: Chance::Tested { effects: friction::LAWS.len(), p: needed.chance },
+            moment: None,
+        }),
     }
 }

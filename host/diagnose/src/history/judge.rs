@@ -8,6 +8,7 @@ use super::answer::{
 use super::campaign::Points;
 use super::criteria::{JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES};
 use super::findings::{self, Contrast, Visits};
+use super::gap;
 use super::law::Law;
 use super::shift_fit::knot_step;
 use super::unseen::{Sizes, Unseen};
@@ -165,7 +166,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
     let mut found = Vec::new();
     found.extend(first_run(points, fits, visits, named));
     found.push(creep(points, fits, named, half));
-    found.extend(gap(points, fits, visits, named));
+    found.extend(gap::finding(points, fits, visits, named));
     found.extend(fits.events.iter().map(|e| {
         let length = 1e3 * points.mountings[e.mounting].stroke;
         let half = if e.lasts { half_width_95(fits.memory.folds.len().saturating_sub(1)) * e.error } else { 2.0 * e.error };
@@ -176,6 +177,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             units: points.mountings[e.mounting].runs.len(),
             squares: 0.0,
             cause: (e.lasts && e.sure).then(|| EffectName::EndSlip.info().name.to_owned()),
+            alternatives: Vec::new(),
             mounting: Some(e.mounting + 1),
             run: Some(e.run),
             words: format!(
@@ -201,6 +203,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             units: 0,
             squares: 0.0,
             cause: None,
+            alternatives: Vec::new(),
             mounting: None,
             run: None,
             words: format!(
@@ -216,7 +219,7 @@ fn estimate(contrast: &Contrast, of: &str) -> Estimate {
     Estimate::new(contrast.mean, contrast.half, "N", of)
 }
 
-fn plus_minus(contrast: &Contrast) -> String {
+pub(super) fn plus_minus(contrast: &Contrast) -> String {
     contrast.half.map_or_else(
         || format!("{:.1} N (one unit: no interval)", contrast.mean),
         |h| format!("{:.1} ± {h:.1} N", contrast.mean),
@@ -253,6 +256,7 @@ fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> 
         units: deficit.units,
         squares: deficit.squares,
         cause: (found && named).then(|| EffectName::LogCreep.info().name.to_owned()),
+        alternatives: Vec::new(),
         mounting: None,
         run: Some(1),
         words,
@@ -275,6 +279,7 @@ fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
         units: points.runs.len(),
         squares: 0.0,
         cause: named.then(|| EffectName::LogCreep.info().name.to_owned()),
+        alternatives: Vec::new(),
         mounting: None,
         run: None,
         words: format!(
@@ -286,54 +291,6 @@ fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
             plateau.unwrap_or_default()
         ),
     }
-}
-
-fn gap(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option<Finding> {
-    let (by_mounting, by_run) = findings::gap(points, visits);
-    let positive = |c: &Option<Contrast>| c.as_ref().is_some_and(Contrast::is_positive);
-    let (contrast, of) = match (by_mounting, by_run) {
-        (Some(m), _) if positive(&by_mounting) => (m, "mounting"),
-        (_, Some(r)) if positive(&by_run) => (r, "run"),
-        (Some(m), _) => (m, "mounting"),
-        (None, Some(r)) => (r, "run"),
-        (None, None) => return None,
-    };
-    let found = contrast.is_positive();
-    let (_, unseen) = fits.best();
-    let left = findings::gap_left(points, &unseen.predicted);
-    let (rubs, friction, error) = fits.friction;
-    // What the memory leaves of the gap must exclude none before friction is its cause.
-    let rests = left.as_ref().is_none_or(|l| l.half.is_some_and(|h| l.mean > h));
-    let cause = match (found, rubs && rests, named) {
-        (true, true, _) => Some(EffectName::PressureFriction.info().name.to_owned()),
-        (true, false, true) => Some(EffectName::LogCreep.info().name.to_owned()),
-        _ => None,
-    };
-    let after = left.map(|l| format!("; the memory leaves {}", plus_minus(&l))).unwrap_or_default();
-    let words = format!(
-        "emptying pulls {} more than filling when shortened, compared with full length ({} {of}s){}",
-        plus_minus(&contrast),
-        contrast.units,
-        match (found, named) {
-            (false, _) => "; its interval includes none".to_owned(),
-            (true, false) => String::new(),
-            (true, true) if rubs => format!(
-                "{after}, and friction of {friction:.4} ± {error:.4} of the pressure is needed beside it"
-            ),
-            (true, true) => format!("{after}: the memory explains it, dry friction is not needed"),
-        }
-    );
-    Some(Finding {
-        kind: FindingKind::FillingEmptyingGap,
-        found,
-        size: estimate(&contrast, of),
-        units: contrast.units,
-        squares: contrast.squares,
-        cause,
-        mounting: None,
-        run: None,
-        words,
-    })
 }
 
 /// What each layer takes of the squared error of supported points of unseen runs.

@@ -1,11 +1,13 @@
 //! A muscle with and without memory.
 
 use super::super::answer::FindingKind;
-use super::super::{History, history};
+use super::super::friction::Needed;
+use super::super::{History, found, history};
 use crate::linear::Random;
 use model_core::braid::Geometry;
+use model_core::effects::EffectName;
 use model_core::table;
-use pam_data::recording::{Campaign, Recording};
+use pam_data::recording::{Campaign, Clock, Recording};
 
 /// What a synthetic campaign is made of.
 #[derive(Clone, Copy)]
@@ -21,10 +23,23 @@ struct Truth {
     /// Mounting and run (from 0) from which the pressure's effect is shifted, and by how much, kPa.
     slip: Option<(usize, usize, f64)>,
     runs: usize,
+    /// Friction of the base model, as a share of the force.
+    factor: f64,
+    /// Friction of constant size, N.
+    strand: f64,
 }
 
-const NO_MEMORY: Truth =
-    Truth { share: 0.0, balance: 110.0, noise: 0.3, slow: 0.0, offsets: 0.0, slip: None, runs: 5 };
+const NO_MEMORY: Truth = Truth {
+    share: 0.0,
+    balance: 110.0,
+    noise: 0.3,
+    slow: 0.0,
+    offsets: 0.0,
+    slip: None,
+    runs: 5,
+    factor: 0.0,
+    strand: 0.0,
+};
 const MEMORY: Truth = Truth { share: 0.6, ..NO_MEMORY };
 
 const THRESHOLDS: [f64; 3] = [80.0, 220.0, 340.0];
@@ -69,7 +84,10 @@ fn campaign(truth: Truth, seed: u64) -> Campaign {
                     let mean = states.iter().sum::<f64>() / 5.0;
                     slow = slow * (-0.5_f64 / 6.0).exp()
                         + truth.slow * (1.0 - (-1.0_f64 / 6.0).exp()).sqrt() * random.normal();
-                    let force = pull(p + truth.share * mean + offset, *threshold)
+                    let free = pull(p + truth.share * mean + offset, *threshold);
+                    let along = if t < 27.0 { -1.0 } else { 1.0 };
+                    let force = free
+                        + along * (truth.factor * free + truth.strand.min(free))
                         + slow
                         + truth.noise * random.normal();
                     time.push(t);
@@ -149,6 +167,56 @@ fn dry_friction_alone_is_no_memory() {
     }
     let h = asked(&c);
     assert!(!h.named, "{:?}", h.law.relaxed_share);
+}
+
+/// The friction that is named beside the memory.
+fn friction(campaign: &Campaign) -> Option<Needed> {
+    found(campaign, &geometry()).expect("a campaign of staircases").friction
+}
+
+/// The same campaign by one clock, which gives the pauses.
+fn clocked(truth: Truth, seed: u64) -> Campaign {
+    let mut campaign = campaign(truth, seed);
+    for (run, recording) in campaign.recordings.iter_mut().enumerate() {
+        recording.time.iter_mut().for_each(|t| *t += (50.0 + PAUSE) * run as f64);
+    }
+    campaign.clock = Clock::Shared;
+    campaign
+}
+
+#[test]
+fn friction_beside_the_memory_is_named_with_its_size() {
+    for seed in 0..3 {
+        let needed = friction(&clocked(Truth { strand: 2.0, runs: 8, ..MEMORY }, 200 + seed));
+        let needed = needed.unwrap_or_else(|| panic!("seed {seed}: not named"));
+        assert_eq!(needed.name.effect, EffectName::CoulombFriction, "seed {seed}: {needed:?}");
+        assert!((needed.value / 2.0 - 1.0).abs() < 0.4, "seed {seed}: {needed:?}");
+    }
+}
+
+#[test]
+fn no_friction_is_named_beyond_that_of_the_base_model() {
+    let of_the_base = Truth { factor: 0.02, ..MEMORY };
+    let slow = Truth { noise: 0.05, slow: 1.0, ..MEMORY };
+    let offsets = Truth { slow: 1.0, offsets: 1.0, ..MEMORY };
+    for seed in 0..5 {
+        for (what, truth) in
+            [("none", MEMORY), ("base", of_the_base), ("slow noise", slow), ("offsets", offsets)]
+        {
+            let needed = friction(&campaign(truth, 300 + seed));
+            assert!(needed.is_none(), "{what}, seed {seed}: {needed:?}");
+        }
+    }
+}
+
+#[test]
+fn the_gap_of_a_memory_is_not_put_down_to_friction() {
+    for seed in 0..3 {
+        let h = asked(&campaign(MEMORY, 400 + seed));
+        let gap = h.of(FindingKind::FillingEmptyingGap).next().expect("a gap");
+        assert!(gap.found && gap.cause.as_deref() == Some("log-creep"), "seed {seed}: {gap:?}");
+        assert!(gap.alternatives.is_empty(), "seed {seed}: {gap:?}");
+    }
 }
 
 #[test]
