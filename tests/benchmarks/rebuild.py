@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BEFORE = "3790793e^"
 # File names of one module in diagnosis and one in the recordings; both trees have them.
 CHANGED = {"diagnosis": "diagnose/**/verdict.rs", "recordings": "recording/cells.rs"}
-# The smallest of so many changes counts, because other programs can only add to it.
+# The smallest cost of this number of changes counts, because other programs can only add to it.
 CHANGES = 3
 
 

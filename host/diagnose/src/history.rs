@@ -52,8 +52,8 @@ use model_core::braid::Geometry;
 use pam_data::recording::Campaign;
 
 use self::campaign::Points;
-use self::friction::Friction;
 use self::criteria::{MEMORY_SINGLE_TIMES, TIMES};
+use self::friction::Friction;
 use self::law::{Law, Layer};
 use self::run_offset::Event;
 use self::unseen::Unseen;

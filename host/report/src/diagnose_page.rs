@@ -278,8 +278,8 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
     for m in &d.missing {
         if is_from_history(m) {
             section.text(format!(
-                "`{}`: nothing yet. In these recordings it makes up to {} N ({} % of blocked force); it was found at held length, and no table \
-                 carries this law.",
+                "`{}`: a table of these recordings carries it where they are then predicted better (`-o`). It makes up to {} N ({} % of blocked \
+                 force) in them. It was found at held length; under motion it is a prediction.",
                 m.effect,
                 figures(m.peak_N, 2),
                 percent(m.peak_N, d.blocked_force_N)
