@@ -87,8 +87,7 @@ fn rests(run: &Run) -> Vec<Rest> {
 fn alike(a: &Rest, b: &Rest, range: f64) -> bool {
     let ratio = a.step / b.step;
     (a.pressure - b.pressure).abs() <= LOSS_ALIKE_PRESSURE * range
-        && ratio >= 1.0 - LOSS_ALIKE_STEP
-        && ratio <= 1.0 / (1.0 - LOSS_ALIKE_STEP)
+        && (1.0 - LOSS_ALIKE_STEP..=1.0 / (1.0 - LOSS_ALIKE_STEP)).contains(&ratio)
 }
 
 /// By how much the rate of a run differs from similar rests of BEFORE, 1/s: robust.
