@@ -156,15 +156,9 @@ impl Actuation for VirtualBench {
     }
 
     fn check(&mut self, check: CheckKind, force: f64, pressure: f64) -> Result<Option<String>> {
-        let at = match check {
-            CheckKind::DeadWeights => 0,
-            CheckKind::RigidBar => 1,
-            CheckKind::ReferenceGauge => 2,
-            CheckKind::Weighing => 3,
-        };
         let made = checks::all(&self.spec, force, pressure, self.bench.clock());
         let seconds = check.seconds() + crate::criteria::HANDLING_S;
         self.act(BenchStep::Rest { seconds }, false)?;
-        Ok(made.into_iter().nth(at).map(|c| c.csv))
+        Ok(made.into_iter().find(|c| c.name == check.file()).map(|c| c.csv))
     }
 }

@@ -11,7 +11,6 @@ use model_core::link::messages::{Fault, Side, State};
 use pam_campaign::controller::{Controller, MakeCheck};
 use pam_campaign::prompt::Prompt;
 use pam_campaign::rig::{Axis as RigAxis, Rig};
-use pam_campaign::step::CheckKind;
 use pam_campaign::stroke_axis::{BAUD, Line, NoAxis, StrokeAxis};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
@@ -72,13 +71,8 @@ pub(crate) fn emulated(
     allow_silence(&mut client, speed)?;
     limit(&mut rig, &mut client)?;
     let made: MakeCheck = Box::new(move |check, force, pressure, clock| {
-        let at = match check {
-            CheckKind::DeadWeights => 0,
-            CheckKind::RigidBar => 1,
-            CheckKind::ReferenceGauge => 2,
-            CheckKind::Weighing => 3,
-        };
-        Ok(checks::all(&bench, force, pressure, clock).into_iter().nth(at).map(|c| c.csv))
+        let made = checks::all(&bench, force, pressure, clock);
+        Ok(made.into_iter().find(|c| c.name == check.file()).map(|c| c.csv))
     });
     let words = emulated.words();
     let controller = Controller::new(client, Box::new(axis.clone()), made);

@@ -20,7 +20,7 @@ use pam_fit::numerics::student::{chance_beyond, half_width_95};
 
 use super::campaign::Points;
 use super::criteria::{KEPT_ERRORS, LEAST_AREA, THRESHOLD_FROM, THRESHOLD_TO, TIMES};
-use super::held_table::predicts_better;
+use super::held_table::{gain_by_runs, predicts_better};
 use super::law::{Law, Layer};
 use super::run_offset;
 use super::unseen::{self, Unseen, jackknife};
@@ -166,10 +166,8 @@ fn measured(points: &Points, law: Law, unseen: Unseen) -> Tried {
 
 /// How many standard errors by runs one sum of squares lies below another.
 fn errors_below(with: &[f64], without: &[f64]) -> f64 {
-    let gains: Vec<f64> = without.iter().zip(with).map(|(o, w)| o - w).collect();
-    let (count, gain) = (gains.len() as f64, gains.iter().sum::<f64>());
-    let variance = gains.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0);
-    gain / (count * variance).sqrt().max(f64::MIN_POSITIVE)
+    let (gain, error) = gain_by_runs(with, without);
+    gain / error.max(f64::MIN_POSITIVE)
 }
 
 /// Whether one predicts no worse than another, by the 95 % interval over runs.
