@@ -125,7 +125,11 @@ fn what_cannot_be_known_is_left_out_and_listed() {
     );
     let (guessed, read) = by_guess(&text, None);
     assert!(!guessed.has(Quantity::Force) && read[0].force.is_none());
-    assert!(guessed.unknown.iter().any(|l| l.contains("scale and the offset")), "{:?}", guessed.unknown);
+    assert!(
+        guessed.unknown.iter().any(|l| l.text().contains("scale and the offset")),
+        "{:?}",
+        guessed.unknown
+    );
     // A contraction of 75 % is relative to something else than the rest length.
     let text = format!(
         "time_s,pressure_kPa,contraction,force_N,stroke_mm\n{}",

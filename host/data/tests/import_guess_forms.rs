@@ -41,7 +41,7 @@ fn pressures(names: &[&str]) -> Result<Vec<f64>, String> {
     let (guess, recordings) = read(&files);
     match recordings {
         Ok(all) => Ok(all.iter().map(|r| (r.pressure[0] * 1e-3).round()).collect()),
-        Err(_) => Err(guess.unknown.join("; ")),
+        Err(_) => Err(guess.all_unknown()),
     }
 }
 
@@ -86,7 +86,7 @@ fn a_line_above_the_table_is_taken_only_for_the_muscles_own_pressure() {
     let table = String::from_utf8(without_pressure()).unwrap();
     let with = |above: &str, name: &str| {
         let (guess, recordings) = read(&[(name, format!("{above}\n{table}").into())]);
-        (guess.unknown.join("; "), recordings.ok().map(|r| r[0].pressure[0] * 1e-3))
+        (guess.all_unknown(), recordings.ok().map(|r| r[0].pressure[0] * 1e-3))
     };
     assert_eq!(
         with("Supply pressure (bar),7\nAtmospheric pressure: 101.3 kPa\nTest pressure,300,kPa", "a.csv").1,
@@ -109,7 +109,7 @@ fn cells_that_are_no_numbers_are_told_and_nothing_replaces_their_column() {
     let rows = stroke(|[t, p, x, f]| format!("{t:.2}\t\"{p:.0},000\"\t{x:.3}\t{f:.3}"));
     let (guess, recordings) =
         read(&[("a_200kPa.txt", format!("t (s)\tp (Pa)\tx (mm)\tF (N)\n{rows}").into())]);
-    let unknown = guess.unknown.join("; ");
+    let unknown = guess.all_unknown();
     assert!(
         unknown.contains("p (Pa) holds numbers such as") && unknown.contains("separators of thousands"),
         "{unknown}"
@@ -205,7 +205,11 @@ fn channels_are_told_apart_by_what_they_record() {
     assert!(guess.columns.iter().any(|c| c.header == "Pressure_1"), "{}", guess.description);
     let lengthening = stroke(|[t, p, x, f]| format!("{t:.2},{p},{:.3},{f:.3}", 4.0 - x));
     let (guess, _) = read(&[("a.csv", format!("t_s,p_kPa,Strain (%),F_N\n{lengthening}").into())]);
-    assert!(guess.unknown.iter().any(|u| u.contains("the force rises with it")), "{:?}", guess.unknown);
+    assert!(
+        guess.unknown.iter().any(|u| u.text().contains("the force rises with it")),
+        "{:?}",
+        guess.unknown
+    );
 }
 
 #[test]
@@ -219,7 +223,7 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
     let pressures: Vec<f64> = recordings.unwrap().iter().map(|r| (r.pressure[0] * 1e-3).round()).collect();
     assert_eq!(pressures, [200.0, 400.0]);
     assert!(
-        guess.checks.iter().any(|c| c.contains("p2 (kPa); p1 (kPa) could be meant")),
+        guess.checks.iter().any(|c| c.text().contains("p2 (kPa); p1 (kPa) could be meant")),
         "{:?}",
         guess.checks
     );
@@ -230,7 +234,7 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
 
 #[test]
 fn what_a_file_lacks_is_told_with_the_right_remedy() {
-    let told = |text: String| read(&[("a_300kPa.csv", text.into())]).0.unknown.join("; ");
+    let told = |text: String| read(&[("a_300kPa.csv", text.into())]).0.all_unknown();
     let head = "time_s,pressure_kPa,displacement_mm,force_N\n";
     // Two sensors in rows of their own: leaving out incomplete rows leaves none.
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},,\n{:.2},,{x:.3},{f:.3}", t + 0.02));
@@ -286,7 +290,7 @@ fn files_with_another_order_of_columns_are_told_where_columns_are_counted() {
         format!("{t:.2}\t{f:.3}\t{x:.3}\t{p}")
     });
     let told =
-        |second: &Vec<u8>| read(&[("a.txt", first.clone()), ("b.txt", second.clone())]).0.unknown.join("; ");
+        |second: &Vec<u8>| read(&[("a.txt", first.clone()), ("b.txt", second.clone())]).0.all_unknown();
     assert!(told(&other).contains("b.txt have other names or another order"), "{}", told(&other));
     assert_eq!(told(&first), "");
 }

@@ -42,13 +42,13 @@ fn a_held_length_counts_from_the_rest_length() {
     let (guess, recordings) = read(&[("a.csv", file(22.5)), ("b.csv", file(15.0)), ("c.csv", file(0.0))]);
     assert_eq!(strokes_mm(&recordings), [22.5, 15.0, 0.0], "{}", guess.description);
     assert!(
-        guess.checks.iter().any(|c| c.contains("is held at 0 to 22.5 in different files")),
+        guess.checks.iter().any(|c| c.text().contains("is held at 0 to 22.5 in different files")),
         "{:?}",
         guess.checks
     );
     let (guess, recordings) = read(&[("a.csv", file(22.5))]);
     assert_eq!(strokes_mm(&recordings), [22.5], "{}", guess.description);
-    assert!(guess.checks.iter().any(|c| c.contains("is held at 22.5")), "{:?}", guess.checks);
+    assert!(guess.checks.iter().any(|c| c.text().contains("is held at 22.5")), "{:?}", guess.checks);
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn a_held_length_is_taken_from_the_names_of_the_files() {
         let folder = tempfile::tempdir().unwrap();
         let paths = names.map(|name| folder.path().join(name));
         paths.iter().for_each(|path| std::fs::write(path, file(0.25)).unwrap());
-        guess_among(&paths[0], &paths[1..], None).unwrap().unknown.join("; ")
+        guess_among(&paths[0], &paths[1..], None).unwrap().all_unknown()
     };
     assert!(unknown(["festo10mm_run1.csv", "festo10mm_run2.csv"]).contains("no column of displacement"));
 }
@@ -115,7 +115,7 @@ fn a_displacement_that_falls_with_rising_pressure_grows_as_the_muscle_gets_longe
     let (guess, recordings) = read(&[("lifted.csv", format!("t_s,pressure_bar,displacement_mm\n{rows}"))]);
     assert!((recordings[0].stroke[40] - 12e-3).abs() < 0.2e-3, "{}", guess.description);
     assert!(
-        guess.checks.iter().any(|c| c.starts_with("the pressure falls with displacement_mm")),
+        guess.checks.iter().any(|c| c.text().starts_with("the pressure falls with displacement_mm")),
         "{:?}",
         guess.checks
     );
@@ -126,5 +126,5 @@ fn a_displacement_that_falls_with_rising_pressure_grows_as_the_muscle_gets_longe
         text + &format!("{},{},{}\n", cells[0], 3.0 + 0.01 * cells[1], cells[2])
     });
     let (guess, _) = read(&[("held.csv", format!("t_s,pressure_bar,displacement_mm\n{held}"))]);
-    assert!(!guess.checks.iter().any(|c| c.contains("the pressure falls")), "{:?}", guess.checks);
+    assert!(!guess.checks.iter().any(|c| c.text().contains("the pressure falls")), "{:?}", guess.checks);
 }

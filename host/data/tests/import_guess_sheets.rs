@@ -74,7 +74,7 @@ fn a_clock_that_begins_again_begins_a_recording() {
     assert_eq!(lengths(&read), [40, 40, 40], "{}", guess.description);
     same(&read[1], 300.0);
     same(&read[2], 500.0);
-    assert!(guess.checks.iter().any(|c| c.contains("begins again at 2 rows")), "{:?}", guess.checks);
+    assert!(guess.checks.iter().any(|c| c.text().contains("begins again at 2 rows")), "{:?}", guess.checks);
     // Rows that are there twice, or a clock that jumps back a little, are no runs.
     let twice = format!("{HEADER}{}{}", run(300.0), lines(&rows(1.95, 300.0), plain));
     assert!(self::read(&twice).1.is_err());
@@ -100,7 +100,7 @@ fn a_time_of_day_that_passes_midnight_goes_on() {
         let text = lines(&rows(86_399.0, 300.0), |[t, p, x, f]| format!("{},{p},{x},{f}", stamp(t)));
         let (guess, read) = recordings(&format!("{header}{text}"));
         same(&read[0], 300.0);
-        assert!(guess.checks.iter().any(|c| c.contains("passes midnight")), "{:?}", guess.checks);
+        assert!(guess.checks.iter().any(|c| c.text().contains("passes midnight")), "{:?}", guess.checks);
     }
     // Beside a column of the date.
     let text = lines(&rows(86_399.0, 300.0), |[t, p, x, f]| {
@@ -138,12 +138,12 @@ fn dates_with_slashes_are_read_where_their_order_is_known() {
         let (guess, read) = recordings(&file(date));
         same(&read[0], 300.0);
         assert_eq!(read[0].time[0], *begin, "{n} {}", guess.description);
-        assert!(guess.checks.iter().any(|c| c.contains("first")), "{n} {:?}", guess.checks);
+        assert!(guess.checks.iter().any(|c| c.text().contains("first")), "{n} {:?}", guess.checks);
     }
     // One day, which may be in March or in April.
     let (guess, read) = self::read(&file(&|t| format!("3/4/2026 {}", time_of_day(t - 40_000.0))));
     assert!(read.is_err());
-    let unknown = guess.unknown.join("; ");
+    let unknown = guess.all_unknown();
     assert!(unknown.contains("timestamp-month-first") && unknown.contains("3/4/2026"), "{unknown}");
 }
 
@@ -200,7 +200,7 @@ fn separators_of_thousands_are_read_where_they_are_known() {
         });
         let (guess, read) = self::read(&format!("{names}\n{text}"));
         assert!(read.is_err());
-        let unknown = guess.unknown.join("; ");
+        let unknown = guess.all_unknown();
         assert!(unknown.contains("pressure_Pa") && unknown.contains("thousands = "), "{unknown}");
         // With the separator given, they are.
         let import = format!("delimiter = \"{delimiter}\"\nthousands = \"{sign}\"\n");
@@ -253,7 +253,7 @@ fn recordings_side_by_side_are_read_each() {
     let other = beside("", names, "time_s,pressure_kPa,force_N,displacement_mm", 0);
     for text in [one_time, other] {
         let (guess, _) = self::read(&text);
-        assert!(guess.unknown.iter().any(|u| u.contains("side by side")), "{:?}", guess.unknown);
+        assert!(guess.unknown.iter().any(|u| u.text().contains("side by side")), "{:?}", guess.unknown);
     }
 }
 
@@ -286,7 +286,7 @@ fn names_that_stand_again_in_the_middle_are_left_out() {
     for head in [HEADER, units, "Bench 3\ntime_s,pressure_kPa,displacement_mm,force_N\n"] {
         let (guess, read) = recordings(&format!("{head}{}{head}{}", run(0.0, 300.0), run(2.0, 300.0)));
         assert_eq!(lengths(&read), [80], "{head} {}", guess.description);
-        assert!(guess.checks.iter().any(|c| c.contains("again")), "{:?}", guess.checks);
+        assert!(guess.checks.iter().any(|c| c.text().contains("again")), "{:?}", guess.checks);
         let (guess, read) = recordings(&format!("{head}{}\n{head}{}", run(0.0, 300.0), run(0.0, 500.0)));
         assert_eq!(lengths(&read), [40, 40], "{head} {}", guess.description);
         same(&read[1], 500.0);
@@ -296,7 +296,7 @@ fn names_that_stand_again_in_the_middle_are_left_out() {
     let error = read.unwrap_err();
     assert_eq!(error.place().line, Some(42), "{error}");
     assert!(error.advice().is_some_and(|a| a.contains("another order")), "{error}");
-    assert!(guess.unknown.iter().any(|u| u.contains("line 42")), "{:?}", guess.unknown);
+    assert!(guess.unknown.iter().any(|u| u.text().contains("line 42")), "{:?}", guess.unknown);
 }
 
 #[test]

@@ -79,8 +79,11 @@ fn a_unit_that_counts_from_vacuum_loses_one_atmosphere() {
     ];
     for text in files {
         let guessed = read_back(&text);
-        let told =
-            guessed.checks.iter().filter(|c| c.contains("one standard atmosphere is subtracted")).count();
+        let told = guessed
+            .checks
+            .iter()
+            .filter(|c| c.text().contains("one standard atmosphere is subtracted"))
+            .count();
         assert_eq!(told, 1, "{}", guessed.description);
     }
 }
@@ -107,7 +110,7 @@ fn a_vented_muscle_at_one_atmosphere_is_a_question() {
     let absolute = |p: f64| p + 99.2;
     let text = file("time_s,pressure_kPa,displacement_mm,force_N", |r| row(r, absolute, |f| f));
     let (guessed, read) = by_guess(&text);
-    let question = guessed.checks.iter().find(|c| c.contains("is pressure_kPa absolute pressure?"));
+    let question = guessed.checks.iter().find(|c| c.text().contains("is pressure_kPa absolute pressure?"));
     let question = question.unwrap_or_else(|| panic!("{}", guessed.description));
     assert!(question.contains("99.2 kPa") && question.contains("slack"), "{question}");
     assert!(question.contains("write offset = -101.3 under [columns.pressure]"), "{question}");
@@ -227,7 +230,11 @@ fn a_stamp_that_is_ambiguous_or_damaged_is_told() {
     let path = folder.path().join("bench.csv");
     std::fs::write(&path, american).unwrap();
     let guessed = guess(&path, None).unwrap();
-    assert!(guessed.unknown.iter().any(|u| u.contains("timestamp-month-first")), "{:?}", guessed.unknown);
+    assert!(
+        guessed.unknown.iter().any(|u| u.text().contains("timestamp-month-first")),
+        "{:?}",
+        guessed.unknown
+    );
     let iso = file(header, |[t, p, x, f]| format!("2026-11-05T13:30:{t:06.3},{p},{x},{f}"));
     std::fs::write(&path, iso.replacen("13:30:00.100", "13:61:00.100", 1)).unwrap();
     let import = Import::parse("[columns.time]\ncolumn = 1\nunit = \"timestamp\"\n").unwrap();

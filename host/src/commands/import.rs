@@ -163,12 +163,9 @@ fn to_text(guess: &Guess, recordings: &[&Recording], usual: bool) -> String {
         let name = column.quantity.name().replace('_', " ");
         text += &format!("  {name:<17} {:<28} {range}{factor} {}\n", column.header, column.unit);
     }
-    for (what, pattern) in &guess.patterns {
-        let place = if *what == "file_name" { "the file's name" } else { "the lines above the table" };
-        // The first group of a pattern is called after the quantity and its unit.
-        let group =
-            pattern.split_once("(?<").map_or("", |(_, rest)| rest.split(['_', '>']).next().unwrap_or(""));
-        text += &format!("  {group:<17} {place}: {pattern}\n");
+    for pattern in &guess.patterns {
+        let place = if pattern.text == "file_name" { "the file's name" } else { "the lines above the table" };
+        text += &format!("  {:<17} {place}: {}\n", pattern.quantity.name(), pattern.expression);
     }
     if !guess.unused.is_empty() {
         text += &format!("not used: {}\n", guess.unused.join(", "));
@@ -253,8 +250,8 @@ fn to_document(guess: &Guess, recordings: &[&Recording], usual: bool) -> documen
             })
             .collect(),
         unused: guess.unused.clone(),
-        unknown: guess.unknown.clone(),
-        checks: guess.checks.clone(),
+        unknown: guess.unknown.iter().map(ToString::to_string).collect(),
+        checks: guess.checks.iter().map(ToString::to_string).collect(),
         description: guess.description.clone(),
     }
 }

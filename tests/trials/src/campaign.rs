@@ -16,8 +16,9 @@ use std::time::Instant;
 
 pub use methods::Method;
 
-/// Seed of the scored set. It and the bounds below stood in the repository before the first scored run.
-const SEED: u64 = 2_026_112_320;
+/// Seed of the scored set, from the operating system. It and the bounds below stood in the repository before the first scored run. Of an
+/// earlier set 35 muscles were scored, and the weighing check was added to the menu because of them: this is another set.
+const SEED: u64 = 1_188_624_340;
 /// Seed of the development set, on which the choice of steps may be tried.
 const DEVELOPMENT: u64 = 7;
 /// Bench time, s.
@@ -57,9 +58,9 @@ pub struct Campaigns {
     /// Other muscles than the scored ones, for development; writes no page.
     #[arg(long, conflicts_with = "page")]
     development: bool,
-    /// Only this method; with `--development`.
-    #[arg(long, requires = "development", conflicts_with = "short")]
-    only: Option<Method>,
+    /// Only this method, once for each; another call adds other methods for the same muscles.
+    #[arg(long = "method", conflicts_with_all = ["short", "tables"])]
+    methods: Vec<Method>,
     /// Only muscles in which this is hidden, once for each name; with `--development`.
     #[arg(long, requires = "development")]
     hidden: Vec<String>,
@@ -158,11 +159,7 @@ fn specs(muscles: usize, seed: u64) -> Vec<Spec> {
 
 /// Runs the trials.
 pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
-    let folder = what.output.join(match (what.tables, what.only) {
-        (true, _) => "tables".to_owned(),
-        (false, Some(only)) => format!("campaigns-{only:?}").to_lowercase(),
-        (false, None) => "campaigns".to_owned(),
-    });
+    let folder = what.output.join(if what.tables { "tables" } else { "campaigns" });
     std::fs::create_dir_all(&folder)?;
     let mut specs = specs(what.muscles, if what.development { DEVELOPMENT } else { SEED });
     if what.short {
@@ -176,25 +173,28 @@ pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
     }
     let begun = Instant::now();
     let over = || what.minutes.is_some_and(|m| begun.elapsed().as_secs_f64() > 60.0 * m);
-    let methods: &[Method] = match (what.tables, what.short, &what.only) {
+    let methods: &[Method] = match (what.tables, what.short, what.methods.as_slice()) {
         (true, ..) => &[],
         (false, true, _) => &[Method::Chosen],
-        (false, false, Some(only)) => std::slice::from_ref(only),
-        (false, false, None) => &Method::ALL,
+        (false, false, []) => &Method::ALL,
+        (false, false, some) => some,
     };
     let progress = Progress::new("campaigns", specs.len());
     let done = in_order(&specs, |spec| {
         let path = folder.join(format!("{:04}.json", spec.id));
         let known = std::fs::read(&path).ok().and_then(|b| serde_json::from_slice::<Trial>(&b).ok());
-        if let Some(known) = known {
+        let missing =
+            |method: &Method| known.as_ref().is_none_or(|k| k.said.iter().all(|s| s.method != *method));
+        let left: Vec<Method> = methods.iter().copied().filter(missing).collect();
+        if known.is_some() && left.is_empty() {
             progress.one();
-            return Ok(Some(known));
+            return Ok(known);
         }
         if over() {
-            return Ok(None);
+            return Ok(known);
         }
         let bench_s = if what.short { SHORT_BENCH_S } else { BENCH_S };
-        let trial = one(spec, methods, bench_s, !what.short && what.only.is_none())?;
+        let trial = one(spec, known, &left, bench_s, !what.short)?;
         let text = serde_json::to_string_pretty(&trial).map_err(|e| e.to_string())?;
         std::fs::write(&path, text).map_err(|e| e.to_string())?;
         progress.one();
@@ -229,13 +229,19 @@ fn check(all: &[Trial]) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn one(spec: &Spec, methods: &[Method], bench_s: f64, with_errors: bool) -> Result<Trial, String> {
+/// One muscle by some methods, beside what is known of it.
+fn one(
+    spec: &Spec,
+    known: Option<Trial>,
+    methods: &[Method],
+    bench_s: f64,
+    with_errors: bool,
+) -> Result<Trial, String> {
     let made = crate::generate::make(spec, &crate::residuals::Residuals::read(std::path::Path::new("")));
-    let mut said = Vec::new();
-    let errors = match spec.stratum {
-        Stratum::NullClean if with_errors => table_error::after(spec, &made.truth.bench)?,
-        _ => Vec::new(),
-    };
+    let (mut said, mut errors) = known.map_or_else(Default::default, |k| (k.said, k.errors));
+    if spec.stratum == Stratum::NullClean && with_errors && errors.is_empty() {
+        errors = table_error::after(spec, &made.truth.bench)?;
+    }
     for method in methods {
         let recorded = methods::record(*method, spec, &made, bench_s)?;
         said.push(methods::ask(*method, &made, &recorded)?);

@@ -24,6 +24,7 @@ mod lookup;
 mod named_length;
 mod named_pressure;
 mod names;
+mod notes;
 mod others;
 mod problems;
 mod roles;
@@ -40,6 +41,7 @@ use std::path::{Path, PathBuf};
 use super::quantity::Quantity;
 use crate::error::Result;
 use lookup::Listed;
+pub use notes::Note;
 use others::Others;
 use sample::Sample;
 
@@ -79,6 +81,17 @@ pub struct GuessedColumn {
     pub range: Option<(f64, f64)>,
 }
 
+/// A constant that a regular expression takes from a text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GuessedPattern {
+    /// What it is.
+    pub quantity: Quantity,
+    /// The text, as the description calls it: `file_name` or `preamble`.
+    pub text: &'static str,
+    /// The expression.
+    pub expression: String,
+}
+
 /// What a file seems to be.
 #[derive(Debug, Clone, Default)]
 pub struct Guess {
@@ -104,8 +117,8 @@ pub struct Guess {
     pub thousands: Option<char>,
     /// Whether rows without a number in a column that is used are left out.
     pub skip_missing: bool,
-    /// Regular expressions for constants: `file_name` or `preamble`, and the expression.
-    pub patterns: Vec<(&'static str, String)>,
+    /// Constants that are taken from the file's name or from the lines above the table.
+    pub patterns: Vec<GuessedPattern>,
     /// Columns that set runs apart.
     pub split_by: Vec<String>,
     /// Whether a run begins where the time goes back.
@@ -119,9 +132,9 @@ pub struct Guess {
     /// Columns that are not used.
     pub unused: Vec<String>,
     /// What could not be understood.
-    pub unknown: Vec<String>,
+    pub unknown: Vec<Note>,
     /// What the user has to check.
-    pub checks: Vec<String>,
+    pub checks: Vec<Note>,
     /// The import description.
     pub description: String,
     lookup: Option<Listed>,
@@ -144,6 +157,12 @@ impl Guess {
         let one = !self.new_run_by_clock && self.side_by_side.is_none();
         let whole = one && self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
         whole && self.lookup.is_none() && self.columns.iter().all(plain)
+    }
+
+    /// All that could not be understood, in one line.
+    #[must_use]
+    pub fn all_unknown(&self) -> String {
+        self.unknown.iter().map(Note::text).collect::<Vec<_>>().join("; ")
     }
 
     /// Whether a quantity was found.

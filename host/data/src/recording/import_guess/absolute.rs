@@ -54,5 +54,5 @@ pub(super) fn ask(sample: &Sample, guess: &mut Guess) {
         short(start * 1e-3),
         short(si(low) * 1e-3)
     );
-    guess.checks.push(question);
+    guess.checks.push(question.into());
 }

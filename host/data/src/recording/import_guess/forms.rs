@@ -1,5 +1,6 @@
 //! Forms of a file: signs of remarks, separators of thousands, dates with slashes.
 
+use super::Note;
 use super::layout::{Layout, cells, is_missing, number};
 use super::sample::SampleColumn;
 use crate::date::{DateOrder, time_stamp_in};
@@ -52,8 +53,8 @@ pub(super) fn sign_of_remarks(lines: &[&[u8]], layout: &Layout) -> u8 {
 /// What was found of the forms, with what the user has to check and what is not clear.
 #[derive(Debug, Default)]
 pub(super) struct Found {
-    pub checks: Vec<String>,
-    pub unknown: Vec<String>,
+    pub checks: Vec<Note>,
+    pub unknown: Vec<Note>,
 }
 
 /// Looks at the columns whose cells are no numbers; `cells` gives those of one column.
@@ -92,11 +93,12 @@ fn separators(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Fo
         return;
     }
     let sign = char::from(separator);
-    found.unknown.push(format!(
+    let text = format!(
         "{} holds numbers such as `{first}`, whose `{sign}` may separate thousands or be a decimal sign: write numbers without separators of \
          thousands, or describe the column and write thousands = \"{sign}\"",
         column.header
-    ));
+    );
+    found.unknown.push(Note::on_column(&column.header, column.named_for(), text));
 }
 
 /// The order of the dates of a column.
@@ -118,19 +120,21 @@ fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, 
             (DateOrder::DayFirst, "otherwise months would pass between the rows")
         }
         (Some(_), Some(_)) => {
-            found.unknown.push(format!(
+            let text = format!(
                 "{} holds dates such as `{first}`, whose month may be the first or the second number: describe it under [columns.time] with \
                  unit = \"timestamp-month-first\" or \"timestamp-day-first\"",
                 column.header
-            ));
+            );
+            found.unknown.push(Note::on_column(&column.header, column.named_for(), text));
             return;
         }
         (None, None) => return,
     };
     forms.order = order;
     let which = if order == DateOrder::MonthFirst { "month" } else { "day" };
-    found.checks.push(format!(
+    let text = format!(
         "{} has dates such as `{first}`: the {which} is taken to be first, since {reason}",
         column.header
-    ));
+    );
+    found.checks.push(text.into());
 }

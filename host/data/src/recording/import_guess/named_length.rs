@@ -2,9 +2,9 @@
 
 use regex_lite::Regex;
 
-use super::Guess;
 use super::named_pressure::{GAP, NUMBER};
 use super::others::Others;
+use super::{Guess, GuessedPattern};
 use crate::recording::{Quantity, decimal};
 
 /// Units that are looked for in names.
@@ -20,7 +20,7 @@ const LEAST_STROKE: f64 = 0.25;
 pub(super) fn find(others: &Others<'_>, guess: &mut Guess) {
     let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
     let in_file = stroke.iter().any(|q| guess.has(*q)) || guess.lookup.is_some();
-    if in_file || others.files.is_empty() || guess.patterns.iter().any(|(of, _)| *of == "file_name") {
+    if in_file || others.files.is_empty() || guess.patterns.iter().any(|p| p.text == "file_name") {
         return;
     }
     let names: Vec<String> = std::iter::once(guess.file.clone()).chain(others.names()).collect();
@@ -30,14 +30,17 @@ pub(super) fn find(others: &Others<'_>, guess: &mut Guess) {
         let (low, high) = lengths.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
         let (quantity, what) = match low / high {
             share if share >= 1.0 => continue,
-            share if share >= SHORTEST => ("length", "the length"),
-            share if share <= LEAST_STROKE => ("displacement", "the displacement from the rest length"),
+            share if share >= SHORTEST => (Quantity::Length, "the length"),
+            share if share <= LEAST_STROKE => {
+                (Quantity::Displacement, "the displacement from the rest length")
+            }
             _ => continue,
         };
         guess.checks.push(format!(
             "{what} is taken from the names of the files: {low} to {high} {unit}; it was held in each of them"
-        ));
-        guess.patterns.push(("file_name", pattern(quantity, unit, place)));
+        ).into());
+        let expression = pattern(quantity.name(), unit, place);
+        guess.patterns.push(GuessedPattern { quantity, text: "file_name", expression });
         return;
     }
 }

@@ -2,11 +2,11 @@
 
 use regex_lite::{Regex, escape};
 
-use super::Guess;
 use super::names::RUNS;
 use super::others::Others;
 use super::sample::Sample;
 use super::values::{PRESSURES, doubt};
+use super::{Guess, GuessedPattern, Note};
 use crate::recording::quantity::Unit;
 use crate::recording::{Quantity, decimal};
 use crate::short_number::short;
@@ -45,28 +45,34 @@ pub(super) fn find(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
         (Some(Found::Pattern { first: above, .. }), Some(Found::Pattern { first: name, .. }))
             if (above - name).abs() > NOMINAL * above.abs().max(name.abs()) =>
         {
-            guess.unknown.push(format!(
+            let text = format!(
                 "the pressure is {} kPa by the lines above the table and {} kPa by the file's name: write the right one under [constants]",
                 short(above * 1e-3),
                 short(name * 1e-3)
-            ));
+            );
+            guess.unknown.push(Note::on_quantity(Quantity::Pressure, text));
         }
         (Some(Found::Pattern { pattern, check, .. }), _) => {
-            guess.checks.push(check);
-            guess.patterns.push(("preamble", pattern));
+            guess.checks.push(check.into());
+            guess.patterns.push(caught_by("preamble", pattern));
         }
         (_, Some(Found::Pattern { pattern, check, .. })) => {
-            guess.checks.push(check);
-            guess.patterns.push(("file_name", pattern));
+            guess.checks.push(check.into());
+            guess.patterns.push(caught_by("file_name", pattern));
         }
         (above, name) => {
             let why = [above, name].into_iter().flatten().filter_map(|found| match found {
-                Found::Unclear(why) => Some(why),
+                Found::Unclear(why) => Some(Note::on_quantity(Quantity::Pressure, why)),
                 Found::Pattern { .. } => None,
             });
             guess.unknown.extend(why);
         }
     }
+}
+
+/// A pressure that an expression catches in this text.
+fn caught_by(text: &'static str, expression: String) -> GuessedPattern {
+    GuessedPattern { quantity: Quantity::Pressure, text, expression }
 }
 
 /// The units, the longest first.

@@ -2,7 +2,7 @@
 
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, Source, roles};
+use super::{Guess, GuessedColumn, Note, Source, roles};
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 
@@ -10,7 +10,7 @@ use crate::recording::Quantity;
 pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
     for column in &sample.columns {
         let Some((quantity, _)) = column.name.quantity() else { continue };
-        let told = guess.unknown.iter().any(|line| line.starts_with(&column.header));
+        let told = guess.unknown.iter().any(|note| note.is_on_column(&column.header));
         let coded = matches!(quantity, Quantity::Direction | Quantity::Cycle);
         if column.texts == 0 || coded || told || guess.has(quantity) {
             continue;
@@ -21,14 +21,15 @@ pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
         } else {
             "remove these cells, or write all decimals with the same sign"
         };
-        guess.unknown.push(format!(
+        let text = format!(
             "{} looks like {}, but {} of {} cells are no numbers, such as `{}`: {advice}",
             column.header,
             quantity.name().replace('_', " "),
             column.texts,
             sample.rows,
             cell.chars().take(40).flat_map(char::escape_debug).collect::<String>()
-        ));
+        );
+        guess.unknown.push(Note::on_column(&column.header, Some(quantity), text));
     }
 }
 
@@ -79,12 +80,15 @@ pub(super) fn incomplete_rows(sample: &Sample, guess: &mut Guess) {
                 1 => "one row has".to_owned(),
                 n => format!("{} have", pluralise(n, "row")),
             }
-        ));
+        ).into());
     } else {
-        guess.checks.push(format!(
-            "{without}: write missing = \"skip\" to leave {} out",
-            pluralise(sample.rows - complete, "row")
-        ));
+        guess.checks.push(
+            format!(
+                "{without}: write missing = \"skip\" to leave {} out",
+                pluralise(sample.rows - complete, "row")
+            )
+            .into(),
+        );
     }
 }
 
@@ -114,7 +118,8 @@ pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
     } else {
         "no column says which run a row belongs to: make one file of each run, or remove the rows that are given twice".to_owned()
     };
-    guess.unknown.push(format!("time does not increase at {}; {problem}", pluralise(at, "row")));
+    let text = format!("time does not increase at {}; {problem}", pluralise(at, "row"));
+    guess.unknown.push(Note::on_column(&time.header, Some(Quantity::Time), text));
 }
 
 /// Files whose columns are in another order, where the description counts columns: nothing else would notice.
@@ -126,6 +131,6 @@ pub(super) fn other_columns(sample: &Sample, others: &Others<'_>, guess: &mut Gu
     if let Some(file) = others.with_other_columns(&headers) {
         guess.unknown.push(format!(
             "the columns of {file} have other names or another order, and the description counts them: describe such files by themselves"
-        ));
+        ).into());
     }
 }

@@ -7,7 +7,7 @@ use super::names::{Family, Name, Score};
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
 use super::{
-    Guess, GuessedColumn, Source, absolute, named_length, named_pressure, problems, runs, side_by_side,
+    Guess, GuessedColumn, Note, Source, absolute, named_length, named_pressure, problems, runs, side_by_side,
     stroke, time, values,
 };
 use crate::pluralise::pluralise;
@@ -117,17 +117,18 @@ fn best(
     if !competitors.is_empty() {
         let header = &sample.columns[first].header;
         if quantity == Quantity::PressureCommand {
-            guess.checks.push(format!(
+            let text = format!(
                 "commanded pressures are in {header}, {}: describe that of this muscle as columns.pressure_command",
                 competitors.join(", ")
-            ));
+            );
+            guess.checks.push(text.into());
             return None;
         }
-        guess.checks.push(format!(
+        guess.checks.push(Note::on_choice(format!(
             "{} is taken from {header}; {} could be meant, too",
             quantity.name().replace('_', " "),
             competitors.join(", ")
-        ));
+        )));
     }
     Some(first)
 }
@@ -154,31 +155,34 @@ fn described(
 ) -> Option<GuessedColumn> {
     let column = &sample.columns[n];
     let (header, what) = (&column.header, quantity.name().replace('_', " "));
+    let on_column = |text: String| Note::on_column(header, Some(quantity), text);
     if column.name.is_raw() {
         let unit = column.name.unit.map_or("", |u| u.text);
-        guess.unknown.push(format!(
+        guess.unknown.push(on_column(format!(
             "{header} looks like {what} in {unit}: describe it with the scale and the offset of the sensor's calibration"
-        ));
+        )));
         return None;
     }
     let (mut unit, mut scale, mut offset) = ("", 1.0, 0.0);
     if let Some(spelled) = column.name.unit {
         (unit, scale, offset) = (spelled.unit, spelled.scale, spelled.offset);
     } else if let Some(text) = &column.name.unknown_unit {
-        guess.unknown.push(format!("{header} looks like {what}, but its unit `{text}` is not known"));
+        guess
+            .unknown
+            .push(on_column(format!("{header} looks like {what}, but its unit `{text}` is not known")));
         return None;
     } else if quantity == Quantity::Contraction && largest(column, others) > 1.0 {
         scale = 0.01;
         let reached = short(largest(column, others));
-        guess.checks.push(format!("{header} is taken as per cent, since it reaches {reached}"));
+        guess.checks.push(on_column(format!("{header} is taken as per cent, since it reaches {reached}")));
     } else if quantity.units().len() > 1 {
         let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
             let (low, high) = column.range();
-            guess.unknown.push(format!(
+            guess.unknown.push(on_column(format!(
                 "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
                 short(low),
                 short(high)
-            ));
+            )));
             return None;
         };
         (unit, scale) = (suggested.unit, suggested.scale);
@@ -187,35 +191,39 @@ fn described(
         } else {
             format!(" (or {})", suggested.others.join(", "))
         };
-        guess.checks.push(format!("{header} does not say its unit; its values look like {unit}{others}"));
+        guess
+            .checks
+            .push(on_column(format!("{header} does not say its unit; its values look like {unit}{others}")));
     }
     let (low, high) = column.range();
     if quantity == Quantity::Pressure && column.name.absolute() {
         // Standard atmosphere; the pressure of the day differs by a few per cent of it.
         offset -= quantity.unit(unit).map_or(0.0, |u| absolute::ATMOSPHERE / u.scale);
-        guess.checks.push(format!("{header} is absolute pressure: one standard atmosphere is subtracted"));
+        guess
+            .checks
+            .push(on_column(format!("{header} is absolute pressure: one standard atmosphere is subtracted")));
     }
     if quantity == Quantity::Contraction && column.name.is_relative_length() {
         (scale, offset) = (-scale, 1.0);
     } else if quantity == Quantity::Contraction && -low > high {
         scale = -scale;
-        guess.checks.push(format!(
+        guess.checks.push(on_column(format!(
             "{header} is negative where it is largest: its sign is reversed, so that shortening is positive"
-        ));
+        )));
     }
     let si = |v: f64| quantity.unit(unit).map_or(v, |u| (v * scale + offset) * u.scale);
     if let Some(doubt) = values::doubt(quantity, si(low), si(high)) {
         if quantity == Quantity::Contraction {
-            guess.unknown.push(format!("{header}: {doubt}"));
+            guess.unknown.push(on_column(format!("{header}: {doubt}")));
             return None;
         }
-        guess.checks.push(format!("{header}: {doubt}"));
+        guess.checks.push(on_column(format!("{header}: {doubt}")));
     }
     if quantity == Quantity::Force && -low > high && scale > 0.0 {
         scale = -scale;
-        guess.checks.push(format!(
+        guess.checks.push(on_column(format!(
             "{header} is negative where it is largest: its sign is reversed, so that pulling is positive"
-        ));
+        )));
     }
     Some(GuessedColumn {
         quantity,
@@ -270,11 +278,12 @@ fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess)
         let clock = &sample.columns[t];
         guess.new_run_by_clock = problems::wraps(clock).is_none() && runs::by_clock(clock);
         if guess.new_run_by_clock {
-            guess.checks.push(format!(
+            let text = format!(
                 "{} begins again at {}: a recording begins there",
                 clock.header,
                 pluralise(left, "row")
-            ));
+            );
+            guess.checks.push(text.into());
         } else {
             problems::clock(clock, left, guess);
         }
@@ -287,11 +296,11 @@ fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess)
     if !stroke.iter().any(|q| guess.has(*q))
         && let Some(listed) = lookup::find(path, &sample.columns)
     {
-        guess.unknown.retain(|line| !line.contains("a contraction of"));
+        guess.unknown.retain(|note| !note.is_on_quantity(Quantity::Contraction));
         for (quantity, header, name) in &listed.quantities {
             guess.columns.push(from_list(*quantity, header, name));
         }
-        guess.checks.push(format!("the mounted length of each run is taken from {}", listed.file));
+        guess.checks.push(format!("the mounted length of each run is taken from {}", listed.file).into());
         guess.lookup = Some(listed);
     }
     several_muscles(sample, guess);
@@ -319,11 +328,12 @@ fn several_muscles(sample: &Sample, guess: &mut Guess) {
     let Some(lengths) = lengths else { return };
     let column = sample.columns.iter().find(|c| c.header == lengths.header);
     let Some(levels) = column.and_then(|c| c.levels.as_ref()).filter(|l| l.words.len() > 1) else { return };
-    guess.checks.push(format!(
+    let text = format!(
         "the file holds muscles of {} rest lengths ({}): the description takes the rows of the muscle that is fitted",
         levels.words.len(),
         list(&levels.words)
-    ));
+    );
+    guess.checks.push(text.into());
     if lengths.unit == "mm" && lengths.scale == 1.0 {
         guess.filters.push((lengths.header, "{rest_length_mm}".to_owned()));
     }
@@ -334,11 +344,12 @@ fn several_muscles(sample: &Sample, guess: &mut Guess) {
     });
     if let Some(name) = named {
         let words = name.levels.as_ref().map(|l| l.words.clone()).unwrap_or_default();
-        guess.checks.push(format!(
+        let text = format!(
             "some of them share a rest length: choose one by --where {}=NAME ({})",
             name.header,
             list(&words)
-        ));
+        );
+        guess.checks.push(text.into());
     }
 }
 
@@ -350,33 +361,30 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
-    let told = |guess: &Guess, quantity: Quantity| {
-        let named = |c: &&SampleColumn| c.name.quantity().is_some_and(|(q, _)| q == quantity);
-        sample.columns.iter().filter(named).any(|c| guess.unknown.iter().any(|u| u.starts_with(&c.header)))
-    };
+    let told =
+        |guess: &Guess, quantity: Quantity| guess.unknown.iter().any(|note| note.is_on_quantity(quantity));
     if !guess.has(Quantity::Time) && !told(guess, Quantity::Time) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
-        guess.unknown.insert(0, text.to_owned());
+        guess.unknown.insert(0, text.into());
     }
-    let caught =
-        |guess: &Guess, name: &str| guess.patterns.iter().any(|(_, p)| p.contains(&format!("<{name}_")));
-    let unclear = guess.unknown.iter().any(|u| u.contains("pressure"));
-    if !guess.has(Quantity::Pressure) && !caught(guess, "pressure") && !unclear {
+    let caught = |guess: &Guess, quantity: Quantity| guess.patterns.iter().any(|p| p.quantity == quantity);
+    let pressure = Quantity::Pressure;
+    if !guess.has(pressure) && !caught(guess, pressure) && !told(guess, pressure) {
         let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants], or catch it from the \
                     names of the files by file_name = '(?<pressure_kPa>[0-9.]+)'";
-        guess.unknown.push(text.to_owned());
+        guess.unknown.push(text.into());
     }
     let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
     let told_of_stroke = stroke.iter().any(|q| told(guess, *q));
-    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, q.name())) && !told_of_stroke {
+    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, *q)) && !told_of_stroke {
         let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
                     under [constants], or give the files of all lengths, whose names say it";
-        guess.unknown.push(text.to_owned());
+        guess.unknown.push(text.into());
     }
     if !guess.has(Quantity::Force) && !told(guess, Quantity::Force) {
-        guess.unknown.push("no column of force: a fit and a diagnosis need it".to_owned());
+        guess.unknown.push("no column of force: a fit and a diagnosis need it".into());
     }
     if !sample.whole {
-        guess.checks.push(format!("the first {} rows were looked at", sample.rows));
+        guess.checks.push(format!("the first {} rows were looked at", sample.rows).into());
     }
 }

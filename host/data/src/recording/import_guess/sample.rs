@@ -4,11 +4,13 @@ use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 
+use super::Note;
 use super::forms::{self, Forms};
 use super::layout::{Layout, cells, is_missing};
 use super::names::Name;
 use crate::date::{DateOrder, time_stamp_in};
 use crate::error::{DataCode, Error, Result};
+use crate::recording::Quantity;
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
 use crate::recording::header::mac_lines;
@@ -99,6 +101,11 @@ impl SampleColumn {
         }
     }
 
+    /// The quantity that its name says.
+    pub(super) fn named_for(&self) -> Option<Quantity> {
+        self.name.quantity().map(|(quantity, _)| quantity)
+    }
+
     /// Whether it holds numbers.
     pub(super) fn is_numeric(&self) -> bool {
         self.texts == 0 && self.missing < self.numbers.len()
@@ -140,9 +147,9 @@ pub(super) struct Sample {
     /// What separates thousands.
     pub thousands: Option<u8>,
     /// How the columns of a container were made, and what was found about the form of a text.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// What is not clear about its form.
-    pub unclear: Vec<String>,
+    pub unclear: Vec<Note>,
 }
 
 impl Sample {
@@ -156,6 +163,7 @@ impl Sample {
         match Container::of(&source.magic) {
             Some(container) => {
                 let (table, notes) = container::columns(path, container, &mut source, Needed::default())?;
+                let notes = notes.into_iter().map(Note::from).collect();
                 Ok(Self { notes, ..Self::of_columns(&table) })
             }
             #[cfg(feature = "excel")]
@@ -237,9 +245,12 @@ impl Sample {
                 continue;
             }
             if row.iter().all(|cell| layout.names.contains(cell)) {
-                self.unclear.push(format!(
-                    "line {number} names the columns again in another order: make one file of each part"
-                ));
+                self.unclear.push(
+                    format!(
+                        "line {number} names the columns again in another order: make one file of each part"
+                    )
+                    .into(),
+                );
             }
             rows.push(row);
             if rows.len() == ROWS {
@@ -250,7 +261,7 @@ impl Sample {
         if let Some(first) = again.first() {
             self.notes.push(format!(
                 "lines above the table stand again among the rows, first in line {first}, and are left out"
-            ));
+            ).into());
         }
         self.rows = rows.len();
         rows

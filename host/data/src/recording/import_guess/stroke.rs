@@ -2,7 +2,7 @@
 
 use super::others::{Others, Range};
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, roles, values};
+use super::{Guess, GuessedColumn, Note, roles, values};
 use crate::recording::{Quantity, columns};
 use crate::short_number::short;
 
@@ -34,7 +34,7 @@ pub(super) fn judge(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
     let si = Quantity::Displacement.unit(column.unit).map_or(1.0, |u| u.scale * column.scale.abs());
     let held = if moved { None } else { held(&header, own, si, others) };
     let Some(column) = guess.columns.iter_mut().find(is_stroke) else { return };
-    guess.checks.push(match held {
+    let text = match held {
         Some(how) => format!(
             "{header} {how}: it is taken to count from the rest length; if it has a zero of its own, write it as zero under \
              [columns.displacement]"
@@ -45,7 +45,8 @@ pub(super) fn judge(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
                 "{header} has a zero of its own: the stroke is counted from the greatest length in each file, which must be the rest length"
             )
         }
-    });
+    };
+    guess.checks.push(text.into());
 }
 
 /// How a displacement shows that it is held and not moved: counted from the greatest length in each file, nothing would be left of it.
@@ -101,10 +102,11 @@ fn contraction(sample: &Sample, guess: &mut Guess) {
     let pressure = values(Quantity::Pressure);
     if values::force_against(&contraction, &force, pressure.as_deref()).is_some_and(|r| r > SHOWN) {
         guess.columns.retain(|c| c.quantity != Quantity::Contraction);
-        guess.unknown.push(format!(
+        let text = format!(
             "{header} looks like a contraction, but the force rises with it: it seems to grow as the muscle gets longer, from a zero of its \
              own; write (L0 − L)/L0, or describe a displacement"
-        ));
+        );
+        guess.unknown.push(Note::on_column(&header, Some(Quantity::Contraction), text));
     }
 }
 
@@ -148,12 +150,13 @@ fn sign(sample: &Sample, guess: &mut Guess) {
     column.extension = lengthens;
     let at = if by_force.is_some() { " at equal pressure" } else { "" };
     let [longer, shorter] = how;
-    guess.checks.push(if lengthens {
+    let text = if lengthens {
         format!("{longer} {}{at}: it is taken to grow as the muscle gets longer", column.header)
     } else {
         format!(
             "{shorter} {}{at}: it is taken to grow as the muscle shortens, despite its name",
             column.header
         )
-    });
+    };
+    guess.checks.push(text.into());
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Guess, GuessedColumn, Source};
+use super::{Guess, GuessedColumn, GuessedPattern, Source};
 
 /// Quotes a text for TOML.
 pub(super) fn quoted(text: &str) -> String {
@@ -86,8 +86,8 @@ fn file_form(guess: &Guess) -> String {
     if guess.skip_missing {
         out += "missing = \"skip\"\n";
     }
-    for (name, pattern) in &guess.patterns {
-        let _ = writeln!(out, "{name} = {}", literal(pattern));
+    for GuessedPattern { text, expression, .. } in &guess.patterns {
+        let _ = writeln!(out, "{text} = {}", literal(expression));
     }
     if !guess.split_by.is_empty() {
         let list: Vec<String> = guess.split_by.iter().map(|n| quoted(n)).collect();

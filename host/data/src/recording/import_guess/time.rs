@@ -2,7 +2,7 @@
 
 use super::roles::source;
 use super::sample::{Sample, SampleColumn};
-use super::{Guess, GuessedColumn, values};
+use super::{Guess, GuessedColumn, Note, values};
 use crate::date::{DateOrder, time_stamp};
 use crate::recording::Quantity;
 use crate::recording::import::time_stamp_unit;
@@ -23,9 +23,9 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
         let order = if plain { DateOrder::YearFirst } else { sample.order };
         guess.columns.insert(0, time_column(sample, n, time_stamp_unit(order), 1.0, None));
         if let Some(row) = column.midnight {
-            guess
-                .checks
-                .push(format!("{} passes midnight at row {row}: a day is added from there", column.header));
+            guess.checks.push(
+                format!("{} passes midnight at row {row}: a day is added from there", column.header).into(),
+            );
         }
         return;
     }
@@ -35,14 +35,15 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
         text.contains(':') || text.matches(['-', '/', '.']).count() > 1
     };
     if let Some(column) = sample.columns.iter().find(|c| !c.is_numeric() && is_time(c) && dated(c)) {
-        if guess.unknown.iter().any(|line| line.starts_with(&column.header)) {
+        if guess.unknown.iter().any(|note| note.is_on_column(&column.header)) {
             return;
         }
-        guess.unknown.push(format!(
+        let text = format!(
             "{} holds dates or times of day that are not read: write them as 2026-11-21T13:30:00.25, write seconds from some beginning, or \
              give sample_interval_s",
             column.header
-        ));
+        );
+        guess.unknown.push(Note::on_column(&column.header, Some(Quantity::Time), text));
         return;
     }
     let unnamed = |(n, c): &(usize, &SampleColumn)| {
@@ -59,11 +60,14 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
             return;
         }
         used[n] = true;
-        guess.checks.push(format!(
-            "column {} is taken as the time in {}, since it increases from row to row",
-            column.header,
-            if suggested.scale == 1.0 { suggested.unit } else { "µs" }
-        ));
+        guess.checks.push(
+            format!(
+                "column {} is taken as the time in {}, since it increases from row to row",
+                column.header,
+                if suggested.scale == 1.0 { suggested.unit } else { "µs" }
+            )
+            .into(),
+        );
         let range = Some(column.range());
         guess.columns.insert(0, time_column(sample, n, suggested.unit, suggested.scale, range));
     }
