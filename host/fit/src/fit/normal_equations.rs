@@ -27,6 +27,12 @@ impl NormalEquations {
         Self { matrix: Symmetric::zeros(n), right: vec![0.0; n], misfit: 0.0, weight: 0.0 }
     }
 
+    /// With the lower half of the matrix copied to the upper one.
+    fn mirrored(mut self) -> Self {
+        self.matrix.mirror();
+        self
+    }
+
     /// `self + factor · other`.
     pub fn add_scaled(&mut self, other: &Self, factor: f64) {
         self.matrix.add_scaled(&other.matrix, factor);
@@ -174,6 +180,7 @@ impl Design {
         sums
     }
 
+    /// Adds the sums of one bin to the lower half of the matrix and to the other sums; [`NormalEquations::mirrored`] completes them.
     fn expand(&self, sums: &Sums, phi: &[f64], into: &mut NormalEquations) {
         if sums.weight <= 0.0 {
             return;
@@ -206,12 +213,7 @@ impl Design {
                     continue;
                 }
                 match (a <= m, b <= m) {
-                    (true, true) => {
-                        block(&mut into.matrix, a, b, value);
-                        if a != b {
-                            block(&mut into.matrix, b, a, value);
-                        }
-                    }
+                    (true, true) => block(&mut into.matrix, a, b, value),
                     (false, true) => {
                         for (j, p) in live.clone().zip(phi) {
                             into.matrix.add(place(a), layout.elastic(b, j), value * p);
@@ -239,7 +241,7 @@ impl Design {
                 self.expand(s, &bin.phi, &mut normal);
             }
         }
-        normal
+        normal.mirrored()
     }
 
     /// The normal equations of all points.
@@ -261,7 +263,7 @@ impl Design {
         for (bin, s) in self.sums(rows, parameters, curves, weights) {
             self.expand(&s, &self.bins[bin as usize].phi, &mut normal);
         }
-        normal
+        normal.mirrored()
     }
 
     /// The normal equations of each group alone.
@@ -274,6 +276,6 @@ impl Design {
                 self.expand(s, &bin.phi, normal);
             }
         }
-        normals
+        normals.into_iter().map(NormalEquations::mirrored).collect()
     }
 }

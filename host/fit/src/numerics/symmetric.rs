@@ -44,6 +44,15 @@ impl Symmetric {
         }
     }
 
+    /// Copies the lower half to the upper one.
+    pub fn mirror(&mut self) {
+        for i in 1..self.n {
+            for j in 0..i {
+                self.a[j * self.n + i] = self.a[i * self.n + j];
+            }
+        }
+    }
+
     /// `self + factor · other`.
     pub fn add_scaled(&mut self, other: &Self, factor: f64) {
         for (x, y) in self.a.iter_mut().zip(&other.a) {
