@@ -112,8 +112,8 @@ fn a_vented_muscle_at_one_atmosphere_is_a_question() {
     let (guessed, read) = by_guess(&text);
     let question = guessed.checks.iter().find(|c| c.text().contains("is pressure_kPa absolute pressure?"));
     let question = question.unwrap_or_else(|| panic!("{}", guessed.description));
-    assert!(question.contains("99.2 kPa") && question.contains("slack"), "{question}");
-    assert!(question.contains("write offset = -101.3 under [columns.pressure]"), "{question}");
+    assert!(question.text().contains("99.2 kPa") && question.text().contains("slack"), "{question}");
+    assert!(question.text().contains("write offset = -101.3 under [columns.pressure]"), "{question}");
     assert!((read.pressure[0] - 99.2e3).abs() < 1.0, "nothing is subtracted");
     assert!(guessed.description.contains(&format!("# - {question}")));
     // A loop at 100 kPa by a gauge, under load from the beginning, is none; nor is a vented gauge.
