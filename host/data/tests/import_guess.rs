@@ -87,10 +87,10 @@ fn files_of_laboratories_are_read_by_what_is_guessed() {
 fn a_pressure_of_the_name_or_of_the_lines_above_is_taken() {
     let three = |[t, _, x, f]: [f64; 4]| format!("{t:.3},{x:.3},{f:.3}");
     let (guessed, read) = by_guess(&format!("time_s,displacement_mm,force_N\n{}", rows(three)), None);
-    assert_eq!((read[0].pressure[0], guessed.patterns[0].0), (300e3, "file_name"));
+    assert_eq!((read[0].pressure[0], guessed.patterns[0].text), (300e3, "file_name"));
     let above = format!("Test pressure: 3,02 bar\ntime_s,displacement_mm,force_N\n{}", rows(three));
     let (guessed, read) = by_guess(&above, None);
-    assert_eq!((read[0].pressure[0], guessed.patterns[0].0), (302e3, "preamble"), "{}", guessed.description);
+    assert_eq!((read[0].pressure[0], guessed.patterns[0].text), (302e3, "preamble"), "{}", guessed.description);
 }
 
 #[test]

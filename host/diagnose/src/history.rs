@@ -33,6 +33,7 @@ mod gap;
 mod held_table;
 mod judge;
 mod law;
+pub mod lengths;
 mod memory;
 mod places;
 mod run_offset;
