@@ -33,7 +33,6 @@ mod gap;
 mod held_table;
 mod judge;
 mod law;
-pub mod lengths;
 mod memory;
 mod places;
 mod run_offset;

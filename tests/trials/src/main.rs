@@ -15,7 +15,6 @@ mod fitted;
 mod generate;
 mod inject;
 mod ledger;
-mod lengths;
 mod limits;
 mod locate;
 mod maps;
@@ -216,8 +215,6 @@ enum Command {
     Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
-    /// Lengths of mountings.
-    Lengths(lengths::Lengths),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
     /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
@@ -287,7 +284,6 @@ fn main() -> ExitCode {
         Command::Campaign(what) => campaign::run(&what),
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
-        Command::Lengths(what) => lengths::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::ReferenceFurther(what) => reference::further::run(&what),
         Command::ReferenceBench(what) => {

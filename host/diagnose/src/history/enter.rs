@@ -54,7 +54,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
 }
 
 /// The recordings with the pressure that the muscle would need without its memory and slips.
-pub(super) fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
+fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
     let mut freed = campaign.clone();
     for (recording, (times, shifts)) in freed.recordings.iter_mut().zip(&found.shifts) {
         let mut at = 0;

@@ -299,7 +299,7 @@ pub fn table(settled: &Campaign, muscle: &MuscleDescription) -> Result<Option<Ta
 }
 
 /// The base model's table. Few recordings may ask for dimensions that no table has: then those of the description stay.
-pub(super) fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
+fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
     let with = |as_described: bool| {
         table_alone(campaign, muscle, &FitOptions { as_described, ..FitOptions::default() })
     };
