@@ -90,7 +90,12 @@ fn a_pressure_of_the_name_or_of_the_lines_above_is_taken() {
     assert_eq!((read[0].pressure[0], guessed.patterns[0].text), (300e3, "file_name"));
     let above = format!("Test pressure: 3,02 bar\ntime_s,displacement_mm,force_N\n{}", rows(three));
     let (guessed, read) = by_guess(&above, None);
-    assert_eq!((read[0].pressure[0], guessed.patterns[0].text), (302e3, "preamble"), "{}", guessed.description);
+    assert_eq!(
+        (read[0].pressure[0], guessed.patterns[0].text),
+        (302e3, "preamble"),
+        "{}",
+        guessed.description
+    );
 }
 
 #[test]

@@ -180,6 +180,41 @@ fn one_held_length_determines_no_deadband() {
     assert!(found.summary.warnings.iter().any(|w| w.contains("one length")), "{:?}", found.summary.warnings);
 }
 
+/// A length that is read anew in each run is one length: three mountings determine no more coefficients than three lengths do, and a length
+/// between them is predicted.
+#[test]
+fn a_mounting_whose_length_is_read_anew_in_each_run_is_one_length() {
+    let (mut noise, mut gauge) = (Noise::new(7, 0.0), Noise::new(8, 0.0));
+    let mut run = |stroke: f64| {
+        let mut r = Recording { force: Some(Vec::new()), ..Recording::default() };
+        for i in 0..1000 {
+            let phase = f64::from(i) / 1000.0;
+            let pressure = 100e3 + 450e3 * (1.0 - (1.0 - 2.0 * phase).abs());
+            let direction = if phase < 0.5 { 1.0 } else { -1.0 };
+            r.time.push(f64::from(i) / 20.0);
+            r.pressure.push(pressure);
+            r.force.as_mut().unwrap().push(force(pressure, stroke, direction) + 0.2 * noise.next());
+        }
+        r.stroke = vec![stroke + 1e-5 * gauge.next(); r.time.len()];
+        r
+    };
+    let runs =
+        [0.0, 0.05, 0.1].iter().flat_map(|share| (0..3).map(|_| run(share * REST)).collect::<Vec<_>>());
+    let found = fit(&Campaign::new(runs.collect()), &description(), &Options::default()).unwrap();
+    let (p, stroke) = (500e3, 0.075 * REST);
+    let unseen = Recording {
+        time: vec![0.0, 0.05],
+        pressure: vec![p; 2],
+        stroke: vec![stroke; 2],
+        direction: Some(vec![1; 2]),
+        ..Recording::default()
+    };
+    let file = found.table_file("test".into());
+    let predicted = predict(&file, &Campaign::new(vec![unseen])).unwrap().recordings[0].force[0];
+    let (truth, blocked) = (force(p, stroke, 1.0), force(p, 0.0, 1.0));
+    assert!((predicted - truth).abs() < 0.03 * blocked, "{predicted} N, {truth} N, blocked {blocked} N");
+}
+
 /// Readings in another unit, and readings of a loose plug, change nothing but their own rows: in the table, in what it predicts, and in
 /// the answer of a diagnosis.
 #[test]

@@ -15,6 +15,7 @@ use super::smoothing::Smoothing;
 use crate::numerics::median;
 use crate::numerics::spline_basis::SplineBasis;
 use crate::numerics::symmetric::Symmetric;
+use pam_data::recording::HELD;
 
 /// A campaign as a linear problem.
 #[derive(Debug, Clone)]
@@ -207,7 +208,7 @@ fn both_directions(points: &Points, screen: &Screen) -> bool {
 }
 
 /// Columns at strokes spread evenly over the tested range, so that the time spent at a stroke does not matter. Strokes that differ by
-/// noise only count once.
+/// noise only count once, and so does a mounting whose length was read anew in each run.
 fn spread(points: &Points, shift: &[f64], braid: &Braid<f64>, used: &[PointUse]) -> Vec<Columns> {
     const PLACES: usize = 400;
     /// Two readings of one length differ by less than this many standard deviations.
@@ -221,8 +222,9 @@ fn spread(points: &Points, shift: &[f64], braid: &Braid<f64>, used: &[PointUse])
         }
     }
     let mut last = f64::NEG_INFINITY;
+    let same = if points.held_lengths().is_empty() { 0.0 } else { HELD };
     let apart = |(stroke, shift): (f64, f64)| {
-        let far = stroke - last > APART * points.stroke_noise;
+        let far = stroke - last > same.max(APART * points.stroke_noise);
         far.then(|| {
             last = stroke;
             columns(braid, stroke + shift)
