@@ -15,6 +15,7 @@ pub mod flash;
 pub mod fleet;
 pub mod health;
 pub mod history;
+mod implausible;
 pub mod import;
 mod interrupt;
 pub mod man;

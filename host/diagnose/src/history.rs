@@ -46,7 +46,7 @@ mod tests;
 mod unseen;
 
 pub use answer::History;
-pub use enter::{diagnose, is_from_history};
+pub use enter::{diagnose, is_from_history, reliable_recordings};
 
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;

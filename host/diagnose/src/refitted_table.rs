@@ -110,7 +110,7 @@ fn with_memory(
     if !diagnosis.missing.iter().any(history::is_from_history) {
         return Ok(None);
     }
-    let settled = table_fit::settled(campaign);
+    let settled = table_fit::settled(&history::reliable_recordings(campaign));
     let Some(file) = table_fit::table(&settled, muscle)? else { return Ok(None) };
     let after = predict(&file, campaign)?.rms.unwrap_or(f64::INFINITY);
     let better = after < before && file.table.check().is_ok();

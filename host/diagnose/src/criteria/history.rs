@@ -13,6 +13,8 @@ pam_data::criteria! {
     LEAST_RUNS: f64 = 4.0, "n_r", "1", Derived("three degrees of freedom of the jackknife over runs");
     /// Least share of the campaign's pressure range that a run covers to count as a staircase.
     LEAST_SPAN: f64 = 0.3, "s_P", "1", Derived("definition of the protocol");
+    /// A run shows no memory if more of its readings than this share are excluded as failures of a sensor.
+    MOST_LOST: f64 = 0.02, "s_lost", "1", Judgement;
     /// Weight of squared second differences of spline coefficients.
     SMOOTHNESS: f64 = 0.02, "λ", "1", Measured("chosen on six muscles; flat optimum");
     /// The same for the static comparison.

@@ -2,7 +2,9 @@
 
 use model_core::braid::{Braid, Geometry};
 
-use super::criteria::{ENTER_EXPLAINED, ENTER_REFUTES, ENTER_RESOLVED, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN};
+use super::criteria::{
+    ENTER_EXPLAINED, ENTER_REFUTES, ENTER_RESOLVED, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN, MOST_LOST,
+};
 use super::friction::{self, Needed};
 use super::{Found, History, found};
 use crate::baselines::{self, Kind};
@@ -15,6 +17,7 @@ use crate::why::{Chance, Evidence};
 use model_core::effects::EffectName;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
+use pam_data::recording::dropouts::Screened;
 
 /// The memory's parameter in an answer; the catalogue's `log-creep` is driven by another load and has other parameters.
 const RELAXED_SHARE: &str = "relaxed_share";
@@ -35,9 +38,13 @@ pub fn is_from_history(missing: &Missing) -> bool {
 /// Recordings without force or without rows, or an impossible geometry.
 pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
     options.progress.stage("what the muscle remembers", 0);
-    let Some(found) = found(campaign, geometry) else {
+    let right = reliable(campaign);
+    let Some(mut found) = found(&among(campaign, &right), geometry) else {
         return statically(campaign, geometry, options);
     };
+    // A recording that was left out has no shifts.
+    let mut shifts = std::mem::take(&mut found.shifts).into_iter();
+    found.shifts = right.iter().map(|r| if *r { shifts.next() } else { None }.unwrap_or_default()).collect();
     // What the user gives as known is fitted as it is, to the recordings as they are.
     if !(found.answer.named && options.given.is_empty()) {
         let mut diagnosis = statically(campaign, geometry, options)?;
@@ -51,6 +58,33 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         diagnosis.misfit_rms_N = misfit;
     }
     Ok(diagnosis)
+}
+
+/// Which recordings may show a memory: those of which nearly all readings are free of sensor failures. A failing sensor changes one run
+/// against the others, as a memory does.
+fn reliable(campaign: &Campaign) -> Vec<bool> {
+    let screened = Screened::of(campaign);
+    let lost = |index: usize| {
+        let read = screened.read(index);
+        read.iter().filter(|read| !**read).count() as f64 / read.len().max(1) as f64
+    };
+    (0..campaign.recordings.len()).map(|index| lost(index) <= MOST_LOST).collect()
+}
+
+/// The recordings of a campaign of which nearly all readings are free of sensor failures.
+#[must_use]
+pub fn reliable_recordings(campaign: &Campaign) -> Campaign {
+    among(campaign, &reliable(campaign))
+}
+
+/// The recordings of a campaign that are chosen.
+fn among(campaign: &Campaign, chosen: &[bool]) -> Campaign {
+    let recordings = campaign.recordings.iter().zip(chosen).filter(|(_, chosen)| **chosen);
+    Campaign {
+        recordings: recordings.map(|(recording, _)| recording.clone()).collect(),
+        clock: campaign.clock,
+        warnings: campaign.warnings.clone(),
+    }
 }
 
 /// The recordings with the pressure that the muscle would need without its memory and slips.
