@@ -18,6 +18,7 @@ while [ $# -gt 0 ]; do
         --platform) platform="$2"; shift 2 ;;
         --output) output="$2"; shift 2 ;;
         --no-deb) deb=no; shift ;;
+        -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' packaging/package.sh; exit 0 ;;
         *) echo "unknown option: $1" >&2; exit 2 ;;
     esac
 done

@@ -35,6 +35,17 @@ fn with_name(command: clap::Command, name: &str) -> clap::Command {
         Some(help) => command.after_help(help),
         None => command,
     };
+    let command = command.mut_args(|argument| {
+        let (short, long) = (argument.get_help().cloned(), argument.get_long_help().cloned());
+        let argument = match short {
+            Some(help) => argument.help(in_text(&help.to_string(), name)),
+            None => argument,
+        };
+        match long {
+            Some(help) => argument.long_help(in_text(&help.to_string(), name)),
+            None => argument,
+        }
+    });
     command.mut_subcommands(|sub| with_name(sub, name))
 }
 
@@ -94,6 +105,16 @@ mod tests {
         let said = "Examples:\n  pam fit a.csv && pam flash b\n  pam man | man -l -   # then: pam-fit\nthe host program, `pam vent`";
         assert_eq!(in_text(text, "pam"), said);
     }
+
+    #[test]
+    fn the_help_of_an_option_takes_the_called_name() {
+        let option = clap::Arg::new("with").long("with").help("`host effects` lists the names");
+        let command = clap::Command::new("host").subcommand(clap::Command::new("diagnose").arg(option));
+        let mut command = with_name(command, "pam");
+        let help = command.find_subcommand_mut("diagnose").map(|c| c.render_help().to_string());
+        assert!(help.is_some_and(|help| help.contains("`pam effects` lists")));
+    }
+
     #[test]
     fn only_commands_of_a_page_take_the_called_name() {
         let page = "<td>host 7</td><p>the host, <code>host fit a.csv</code></p>";

@@ -274,6 +274,16 @@ impl Engine {
         if let Some(findings) = fitted(&self.recordings, &self.muscle) {
             self.places.learn_model(findings.model.clone());
             self.findings = Some(findings);
+            self.agree();
+        }
+    }
+
+    /// One blocked force for one campaign: that of the table.
+    fn agree(&mut self) {
+        if let (Some(diagnosis), Some(findings)) = (&mut self.diagnosis, &self.findings)
+            && diagnosis.judged()
+        {
+            diagnosis.blocked_force_N = findings.fit.summary.blocked_force_N;
         }
     }
 
@@ -284,6 +294,7 @@ impl Engine {
     pub fn diagnose(&mut self) -> Result<()> {
         let files: Vec<PathBuf> = self.checks.iter().map(|c| c.1.clone()).collect();
         self.diagnosis = Some(diagnosed(&self.recordings, &self.muscle, &files)?);
+        self.agree();
         self.since_diagnosis = 0;
         Ok(())
     }

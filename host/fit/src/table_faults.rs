@@ -1,6 +1,7 @@
 //! What makes a table useless for control: values that no muscle has, a force that the recordings contradict, pressures that the inverse
 //! cannot find. `host fit` and `host table check` use this one list.
 
+use model_core::effects::EffectName;
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
@@ -60,9 +61,9 @@ fn half_interval(uncertainty: Option<&Uncertainty>, row: usize) -> f64 {
     HALF_95 * root.iter().map(|s| s * s).sum::<f64>().sqrt()
 }
 
-/// A deadband below zero beyond its uncertainty.
+/// A deadband below zero beyond its uncertainty. Pressure that a contact of bladder and braid takes is a part of the deadband.
 fn deadband(table: &MuscleTable, uncertainty: Option<&Uncertainty>) -> Option<String> {
-    let p0 = f64::from(table.deadband.pascals());
+    let p0 = f64::from(table.deadband.pascals()) + contact(table);
     let half = half_interval(uncertainty, 0);
     let least = -NEAR_ZERO * f64::from(table.tested.pressure_high.pascals());
     (p0 < least && p0 + half < 0.0).then(|| {
@@ -71,6 +72,16 @@ fn deadband(table: &MuscleTable, uncertainty: Option<&Uncertainty>) -> Option<St
              dimensions of the muscle (--fit-geometry, --fit-lengths)",
             p0 / 1e3
         )
+    })
+}
+
+/// What the contact of bladder and braid takes immediately at the highest tested pressure, Pa: `d (1 − e^(−P/P_c))` of `bladder-creep`.
+fn contact(table: &MuscleTable) -> f64 {
+    let high = f64::from(table.tested.pressure_high.pascals());
+    let creep = table.effects.iter().find(|e| e.effect == EffectName::BladderCreep);
+    creep.map_or(0.0, |creep| match creep.parameters[..] {
+        [_, _, taken, width] => f64::from(taken) * (1.0 - (-high / f64::from(width).max(1.0)).exp()),
+        _ => 0.0,
     })
 }
 
@@ -163,6 +174,8 @@ fn inverse(table: &MuscleTable) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use model_core::effects::FittedEffect;
+
     use super::*;
 
     fn faults(table: &MuscleTable, uncertainty: Option<&Uncertainty>) -> Vec<String> {
@@ -178,6 +191,18 @@ mod tests {
         let wide =
             Uncertainty { rows: rows as u32, columns: 1, root: vec![0.15; rows], residual_newtons: 1.0 };
         assert!(faults(&table, Some(&wide)).is_empty());
+    }
+
+    #[test]
+    fn the_pressure_of_the_contact_is_a_part_of_the_deadband() {
+        let mut table = model_core::table::example();
+        table.deadband = Pressure::from_pascals(-18e3);
+        assert!(faults(&table, None)[0].contains("P0 is -18.0 kPa"));
+        let creep = |contact| FittedEffect::new(EffectName::BladderCreep, &[0.7, 1.7e4, contact, 1.2e5]);
+        assert!(table.effects.push(creep(8e4)).is_ok());
+        assert!(faults(&table, None).is_empty());
+        table.effects[0] = creep(5e3);
+        assert!(!faults(&table, None).is_empty());
     }
 
     #[test]

@@ -277,7 +277,12 @@ pub fn sentence(finding: &Finding, fleet: &Fleet) -> String {
 fn differences(fleet: &Fleet, overview: &Overview) -> Section {
     let mut section = Section::new("Groups").summarised();
     if overview.tests == 0 {
-        section.text("Tags in the manifest, such as batch, rig, and date, make groups comparable here.");
+        let tagged = fleet.members.iter().any(|m| !m.tags.is_empty());
+        section.text(if tagged {
+            "No tag of the manifest makes two groups of enough muscles to compare."
+        } else {
+            "Tags in the manifest, such as batch, rig, and date, make groups comparable here."
+        });
         return section;
     }
     section.text(format!(

@@ -35,12 +35,13 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
         at
     };
     for layer in shown {
-        let (a, b) = room(SWATCH + 6.0 + inline_markup::width(&layer.name) * FONT_SIZE);
+        let name = shortened(&layer.name, width - SWATCH - 6.0);
+        let (a, b) = room(SWATCH + 6.0 + inline_markup::width(&name) * FONT_SIZE);
         if interactive {
             let _ = write!(out, "<g class=\"entry\" data-layer=\"{}\">", attribute(&layer.name));
         }
         swatch(&mut out, layer, a, b + 10.0);
-        text(&mut out, a + SWATCH + 6.0, b + 14.0, "start", Colour::Ink, "", &layer.name);
+        text(&mut out, a + SWATCH + 6.0, b + 14.0, "start", Colour::Ink, "", &name);
         if interactive {
             out.push_str("</g>");
         }
@@ -80,6 +81,23 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
         text(&mut out, left + bar + 6.0, b + 14.0, "start", Colour::Ink, "", &high);
     }
     if out.is_empty() { (out, 0.0) } else { (out, y + ROW + 8.0) }
+}
+
+/// `name` without characters in its middle, so that it is no wider than `width`: names of recordings differ at both ends.
+fn shortened(name: &str, width: f64) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    let without = |gone: usize| {
+        let kept = letters.len() - gone;
+        let (start, end) = (&letters[..kept.div_ceil(2)], &letters[letters.len() - kept / 2..]);
+        start.iter().chain(&['…']).chain(end).collect::<String>()
+    };
+    if inline_markup::width(name) * FONT_SIZE <= width {
+        return name.to_owned();
+    }
+    (1..letters.len())
+        .map(without)
+        .find(|short| inline_markup::width(short) * FONT_SIZE <= width)
+        .unwrap_or_else(|| name.to_owned())
 }
 
 fn swatch(out: &mut String, layer: &Layer, x: f64, y: f64) {
@@ -125,4 +143,21 @@ fn block(x: f64, y: f64, class: &str, literal: &str, opacity: &str) -> String {
         px(x),
         px(y - 5.5)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_wider_than_the_picture_loses_its_middle() {
+        let name = "A: festo10_cut200mm [relative_contraction_percent=25, run=8]";
+        let short = shortened(name, 300.0);
+        assert!(
+            short.starts_with("A: festo10") && short.ends_with("run=8]") && short.contains('…'),
+            "{short}"
+        );
+        assert!(inline_markup::width(&short) * FONT_SIZE <= 300.0);
+        assert_eq!(shortened(name, 1000.0), name);
+    }
 }

@@ -2,6 +2,7 @@
 
 use pam_campaign::campaign::Done;
 use pam_campaign::engine::Engine;
+use pam_fit::confidence_band::HALF_95;
 use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, wording};
 
 use crate::documents::campaign as document;
@@ -27,7 +28,7 @@ pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) 
     if let Some(diagnosis) = engine.diagnosis() {
         let mut section = Section::new("Diagnosis").summarised();
         section.listing(wording::summary(diagnosis));
-        section.text("diagnosis.html in the same folder shows it with pictures.");
+        section.text("`diagnosis.html` in the same folder shows it with pictures.");
         page.push(section);
     }
     page.push(table_section(told));
@@ -123,8 +124,10 @@ fn table_section(told: &document::Campaign) -> Section {
         return section;
     };
     let mut table = Table::new("The fitted table", &["quantity", "value"]);
-    table
-        .row(["deadband".to_owned(), format!("{:.2} ± {:.2} kPa (1 σ)", t.deadband_kPa, t.deadband_std_kPa)]);
+    table.row([
+        "deadband".to_owned(),
+        format!("{:.2} ± {:.2} kPa (95 %)", t.deadband_kPa, HALF_95 * t.deadband_std_kPa),
+    ]);
     table.row(["blocked force".to_owned(), format!("{:.1} N", t.blocked_force_N)]);
     table.row(["mean error".to_owned(), format!("{:.3} % of blocked force", t.mean_error_pct)]);
     if let Some(error) = t.left_out_pressure_mean_error_pct {
@@ -141,7 +144,9 @@ fn table_section(told: &document::Campaign) -> Section {
         ]);
     }
     section.table(table);
-    section.text("fit.html in the same folder shows the fit with pictures; table.pam goes to the controller with host flash.");
+    section.text(
+        "`fit.html` in the same folder shows the fit with pictures; `table.pam` goes to the controller with `host flash`.",
+    );
     section
 }
 

@@ -55,7 +55,12 @@ impl Arguments {
     /// # Errors
     /// A file that cannot be read or is not a table; one that the description does not suffice for.
     pub fn run(self, console: &Console) -> Result<()> {
-        let Some((first, others)) = self.guess.split_first() else { return Ok(()) };
+        // A pipe gives its rows once, and they are looked at several times.
+        let folder = tempfile::tempdir().map_err(|e| Error::unwritable(std::env::temp_dir(), &e))?;
+        let files = self.guess.iter().map(|f| kept(f, folder.path())).collect::<Result<Vec<PathBuf>>>()?;
+        let (Some((first, others)), Some(named)) = (files.split_first(), self.guess.first()) else {
+            return Ok(());
+        };
         if let Some(path) =
             self.output.as_deref().filter(|p| !self.replace && p.as_os_str() != "-" && p.exists())
         {
@@ -67,8 +72,11 @@ impl Arguments {
         let usual = guess_needed(first, muscle.as_ref());
         let guessed = guess_among(first, others, self.sheet.as_deref())?;
         let import = Import::parse(&guessed.description)?;
-        let tried: Vec<Result<Vec<Recording>>> =
-            self.guess.iter().map(|f| tried(f, &import, &guessed, muscle.as_ref())).collect();
+        let under_its_name = |(file, named): (&PathBuf, &PathBuf)| {
+            let read = tried(file, &import, &guessed, muscle.as_ref());
+            read.map_err(|e| if file == named { e } else { e.file(named) })
+        };
+        let tried: Vec<Result<Vec<Recording>>> = files.iter().zip(&self.guess).map(under_its_name).collect();
         if let Some(path) = &self.output {
             write_whole(path, guessed.description.as_bytes())?;
         }
@@ -95,16 +103,26 @@ impl Arguments {
                 "written to {}; next: host fit --muscle MUSCLE.toml --import {} {}",
                 path.display(),
                 path.display(),
-                first.display()
+                if first == named { named.display().to_string() } else { "-".to_owned() }
             ));
         }
         Ok(())
     }
 }
 
+/// The file itself, or what a pipe gave, as a file in `folder`.
+fn kept(path: &Path, folder: &Path) -> Result<PathBuf> {
+    let piped = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
+    let (true, Some(name)) = (piped, path.file_name()) else { return Ok(path.to_owned()) };
+    let copy = folder.join(name);
+    let mut from = std::fs::File::open(path).map_err(|e| Error::unreadable(path, &e))?;
+    let mut to = std::fs::File::create(&copy).map_err(|e| Error::unwritable(&copy, &e))?;
+    std::io::copy(&mut from, &mut to).map_err(|e| Error::unreadable(path, &e))?;
+    Ok(copy)
+}
+
 /// Whether a file is read without any description.
 fn guess_needed(path: &Path, muscle: Option<&MuscleDescription>) -> bool {
-    // What a pipe gives once is left for the guess.
     let file = std::fs::metadata(path).is_ok_and(|m| m.is_file());
     file && muscle.map_or_else(Reader::new, Reader::of).file(path).is_ok()
 }

@@ -291,15 +291,18 @@ impl Analysis {
     /// What the model leaves out of all recordings.
     ///
     /// # Errors
-    /// As [`pam_diagnose::diagnose`].
+    /// As [`pam_diagnose::history::diagnose`].
     pub fn diagnose(&self, muscle: &str) -> Result<Diagnosed> {
         let (muscle, campaign, ..) = self.read(muscle)?;
         let geometry = muscle.geometry();
-        let answer = pam_diagnose::diagnose(
-            &campaign,
-            &geometry,
-            &pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() },
-        )?;
+        let options = pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
+        let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
+        // One blocked force for one campaign.
+        if answer.judged()
+            && let Ok(plain) = pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default())
+        {
+            answer.blocked_force_N = plain.summary.blocked_force_N;
+        }
         let html = in_page(diagnose_page::page(&answer, &geometry, &campaign).html());
         let report = Self::keep_report(&mut self.known(), report_name()?, html);
         Ok(Diagnosed { text: pam_report::wording::summary(&answer), report })

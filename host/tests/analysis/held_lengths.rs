@@ -53,6 +53,20 @@ fn described_dimensions_stay_where_others_describe_the_force_no_better() {
     }
 }
 
+/// Negative friction or deadband says that the described dimensions are wrong, also where the misfit hardly changes.
+#[test]
+fn a_table_without_faults_is_taken_where_other_dimensions_give_one() {
+    let spec = presets::contractile();
+    let campaign = staircases(&spec, 1);
+    for degrees in [-6.0, -4.5, -3.0, -1.5, 1.5, 3.0, 4.5, 6.0] {
+        let muscle = described(&spec, degrees);
+        let of = |options: Options| fit(&campaign, &muscle, &options).unwrap().summary.faults;
+        let open = of(Options { fit_geometry: true, fit_lengths: true, ..Options::default() });
+        let taken = of(Options::default());
+        assert!(taken.is_empty() || !open.is_empty(), "{degrees}°: {taken:?}");
+    }
+}
+
 /// Fitted dimensions can make up for a factor of the force; then only the described ones show it.
 #[test]
 fn a_force_in_another_unit_is_told_though_fitted_dimensions_describe_it() {

@@ -209,8 +209,8 @@ fn memory(history: &History, peak: f64) -> Missing {
         peak_N: peak,
         p: chance(&history.law.relaxed_share),
         why: Why::Memory {
-            without_pct: history.unseen.without_memory.rms_pct,
-            with_pct: history.unseen.with_memory.rms_pct,
+            without_pct: history.unseen.supported_without.rms_pct,
+            with_pct: history.unseen.supported_with.rms_pct,
             gain: history.unseen.gain,
             least_gain: LEAST_GAIN,
             one_time_constant_ratio: history.law.one_time_constant_ratio,

@@ -9,12 +9,19 @@
 //! N ln(S_described / S_open) > q ln N        G. Schwarz, Ann. Statist. 6 (1978) 461, doi 10.1214/aos/1176344136
 //! ```
 //! `S` is the sum of squared residuals by point, `q` the number of opened values, `N` the number of half-strokes (filling or emptying of
-//! one recording): rows of one half-stroke are correlated and count once.
+//! one recording): rows of one half-stroke are correlated and count once. It is also taken where the described dimensions give values
+//! that no muscle has ([`crate::table_faults`]) and the open ones do not.
 
 use pam_data::pluralise::pluralise;
 
+use pam_data::muscle_description::MuscleDescription;
+
+use crate::table_faults::table_faults;
+use crate::table_file::FitQuality;
+
 use super::Options;
 use super::points::Points;
+use super::result;
 use super::screen::PointUse;
 use super::solution::Solution;
 
@@ -39,7 +46,7 @@ pub(super) struct Choice {
 }
 
 /// Decides between the described dimensions and open ones.
-pub(super) fn choose(described: Solution, open: Solution) -> Choice {
+pub(super) fn choose(described: Solution, open: Solution, muscle: &MuscleDescription) -> Choice {
     let lengths = pluralise(described.problem.points.held_lengths().len(), "mounting");
     let (before, after) = (Misfit::of(&described), Misfit::of(&open));
     let halves = before.halves.min(after.halves).max(1) as f64;
@@ -47,11 +54,17 @@ pub(super) fn choose(described: Solution, open: Solution) -> Choice {
     let cost = open.problem.adjusted.len() as f64 * halves.ln();
     let rms = format!("rms {:.2} N as described, {:.2} N with them", before.rms(), after.rms());
     // A comparison that fails for NaN keeps the described dimensions.
-    if gain > cost {
+    let explained = gain > cost;
+    if explained || (possible(&open, muscle) && !possible(&described, muscle)) {
+        let cause = if explained {
+            ""
+        } else {
+            ", since the described ones give a table that is useless for control"
+        };
         Choice {
             reason: format!(
                 "recorded at held lengths ({lengths}): braid angle, diameter, wall and mounted lengths were fitted too, as with \
-                 --fit-geometry --fit-lengths ({rms}); --as-described keeps the described ones"
+                 --fit-geometry --fit-lengths ({rms}){cause}; --as-described keeps the described ones"
             ),
             solution: open,
         }
@@ -64,6 +77,12 @@ pub(super) fn choose(described: Solution, open: Solution) -> Choice {
             solution: described,
         }
     }
+}
+
+/// Whether a solution gives a table without faults. The uncertainty is not known yet, so every fault counts.
+fn possible(solution: &Solution, muscle: &MuscleDescription) -> bool {
+    result::table(solution, muscle)
+        .is_ok_and(|table| table_faults(&table, None, &FitQuality::default()).is_empty())
 }
 
 /// The squared residuals of a solution.

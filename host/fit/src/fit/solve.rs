@@ -66,7 +66,7 @@ pub(super) fn solve(
         return Ok(Solution { warnings, ..search(problem, screen, options, progress) });
     };
     let described = search(problem.clone(), screen.clone(), options, progress);
-    let choice = held_lengths::choose(described, search(problem, screen, &open, progress));
+    let choice = held_lengths::choose(described, search(problem, screen, &open, progress), muscle);
     warnings.push(choice.reason);
     Ok(Solution { warnings, ..choice.solution })
 }

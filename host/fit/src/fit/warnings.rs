@@ -169,11 +169,12 @@ fn deadband(solution: &Solution, out: &mut Vec<String>) {
     let points = &solution.problem.points;
     let p0 = solution.deadband();
     if p0 < 0.0 {
-        out.push(format!(
-            "the deadband P0 is {:.0} kPa, below zero: the nominal geometry (braid angle, diameter, rest length) does not match the blocked \
-             force; try --fit-geometry",
-            p0 / 1e3
-        ));
+        let cause = if solution.problem.adjusted.is_empty() {
+            "the nominal geometry (braid angle, diameter, rest length) does not match the blocked force; try --fit-geometry"
+        } else {
+            "the fitted dimensions do not explain it; check the zeros of pressure and force"
+        };
+        out.push(format!("the deadband P0 is {:.0} kPa, below zero: {cause}", p0 / 1e3));
     } else if solution.problem.pressures.levels.iter().all(|p| *p < p0) {
         out.push(format!(
             "the deadband P0 is {:.0} kPa, above every tested pressure: the muscle would never pull; check the unit and the sign of the \

@@ -77,7 +77,7 @@ fn run_in(h: &History) -> Figure {
     Figure::multiples(
         "history-runs",
         "Error of unseen runs by run within the mounting",
-        "Left a static curve for each mounting and direction: the first run lies low. Right with memory: all runs lie at zero.",
+        "Left a static curve for each mounting and direction, right with memory. A run at zero is predicted from the others.",
         vec![panel("static curves", false), panel("with memory", true)],
     )
     .shared(true, true)

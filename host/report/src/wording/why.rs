@@ -10,8 +10,8 @@ pub fn why(why: &Why) -> String {
         Why::Measured { check, value } => format!("measured with {check}: {value}"),
         // What was found stands under the history.
         Why::Memory { without_pct, with_pct, gain, least_gain, one_time_constant_ratio } => format!(
-            "error of unseen runs: {without_pct:.2} % of the largest force without it, {with_pct:.2} % with it (rms); the squared error \
-             falls by {:.0} % (at least {:.0} % is required); a single time constant leaves {one_time_constant_ratio:.2} times as much",
+            "error of unseen runs, at pressures that another run of the mounting reaches: {without_pct:.2} % of the largest force without \
+             it, {with_pct:.2} % with it (rms); the squared error falls by {:.0} % (at least {:.0} % is required); a single time constant leaves {one_time_constant_ratio:.2} times as much",
             100.0 * gain,
             100.0 * least_gain,
         ),

@@ -8,6 +8,7 @@ use crate::console::Console;
 use pam_data::date::{self, DateSource};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
+use pam_data::recording::Import;
 use pam_diagnose::timeline::Visit;
 
 /// Endings of files that are taken from a folder; others are notes, tables and pictures. Of files that differ in the ending only, the first
@@ -53,13 +54,17 @@ fn name_of(path: &Path) -> String {
     whole.map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>> {
+/// `lookup` is a table beside the recordings, by which an import description reads them.
+fn recordings_in(folder: &Path, lookup: Option<&Path>) -> Result<Vec<PathBuf>> {
+    let is_lookup = |p: &Path| lookup.is_some_and(|table| folder.join(table) == p);
     let entries = std::fs::read_dir(folder).map_err(|e| Error::unreadable(folder, &e))?;
     let rank = |p: &PathBuf| {
         let ending = p.extension()?.to_string_lossy().to_lowercase();
         ENDINGS.iter().position(|e| *e == ending)
     };
-    let taken = |p: PathBuf| rank(&p).filter(|_| p.is_file()).map(|rank| (p.with_extension(""), rank, p));
+    let taken = |p: PathBuf| {
+        rank(&p).filter(|_| p.is_file() && !is_lookup(&p)).map(|rank| (p.with_extension(""), rank, p))
+    };
     let mut found: Vec<(PathBuf, usize, PathBuf)> =
         entries.flatten().filter_map(|e| taken(e.path())).collect();
     found.sort();
@@ -74,12 +79,17 @@ fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn groups(paths: &[PathBuf]) -> Result<Vec<Group>> {
+fn groups(paths: &[PathBuf], lookup: Option<&Path>) -> Result<Vec<Group>> {
     let mut all: Vec<Group> = Vec::new();
     for path in paths {
         let name = name_of(path);
         if path.is_dir() {
-            all.push(Group { name, paths: vec![path.clone()], files: recordings_in(path)?, day: None });
+            all.push(Group {
+                name,
+                paths: vec![path.clone()],
+                files: recordings_in(path, lookup)?,
+                day: None,
+            });
             continue;
         }
         let day = date::in_text(&name).map(|d| (d / DAY).floor());
@@ -105,7 +115,9 @@ fn groups(paths: &[PathBuf]) -> Result<Vec<Group>> {
 /// Empty folders, files that cannot be read, a single campaign.
 pub(super) fn read(request: &Request<'_>, console: &Console) -> Result<Vec<Found>> {
     // A history of one campaign is refused before anything is read.
-    let groups = groups(request.paths)?;
+    let import = request.import.map(Import::read).transpose()?;
+    let lookup = import.and_then(|i| i.lookup).map(|l| PathBuf::from(l.file));
+    let groups = groups(request.paths, lookup.as_deref())?;
     if groups.len() < 2 {
         return Err(Error::new(DataCode::CallInvalid, "a history needs two campaigns or more").help(
             "give a folder or a file for each campaign; files whose names carry the same date are one campaign",
@@ -143,10 +155,12 @@ mod tests {
     #[test]
     fn a_folder_gives_its_recordings_of_every_format_once() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["a.csv", "a.mcap", "b.tdms", "b.tdms_index", "c.XLSX", "notes.md", "d.lvm", "e.ods"] {
+        for name in
+            ["a.csv", "a.mcap", "b.tdms", "b.tdms_index", "c.XLSX", "notes.md", "d.lvm", "e.ods", "runs.csv"]
+        {
             std::fs::write(folder.path().join(name), "x").unwrap();
         }
-        let names: Vec<String> = recordings_in(folder.path())
+        let names: Vec<String> = recordings_in(folder.path(), Some(Path::new("runs.csv")))
             .unwrap()
             .iter()
             .map(|p| p.file_name().unwrap().to_string_lossy().into_owned())

@@ -292,6 +292,8 @@ mod tests {
             "force_sd_N",
             "length_at_620kPa_mm",
             "joint_angle_rad",
+            "diameter_mm",
+            "Breite [mm]",
             "force setpoint (N)",
             "relative_contraction_percent",
             "notes",

@@ -71,10 +71,14 @@ fn is_dead(r: &Recording, channel: Channel, usual: &Usual) -> bool {
         quantile(&mut values, 0.95) - quantile(&mut values, 0.05)
     };
     match channel {
-        // Without pressure a muscle does not pull.
+        // Without pressure a muscle does not pull. A pressure without any scatter is no measurement: less force is enough, if no other
+        // recording shows it.
         Channel::Pressure => {
+            let pull = |i: usize| force[i] - usual.expected.floor().max(0.0);
+            let least = usual.noticeable_unusually();
             middle.abs() < DEAD * usual.top_pressure
-                && share(&|i| force[i] - usual.expected.floor().max(0.0) > PULLS * usual.spans[2]) > ROWS
+                && (share(&|i| pull(i) > PULLS * usual.spans[2]) > ROWS
+                    || spread <= 0.0 && share(&|i| pull(i).min(usual.expected.residual(r, i)) > least) > ROWS)
         }
         Channel::Force => {
             let expected = |i: usize| usual.expected.at(r, i) - middle;

@@ -41,7 +41,12 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     let mut found = Vec::new();
     let mut i = 1;
     while i < column.len() {
-        let end = if edge(i) && quiet(i) { end_of(r, column, i, edge) } else { None };
+        // What lies between two spikes is no drop-out.
+        if let Some(end) = end_of_spike(column, i, &edge) {
+            i = end + 1;
+            continue;
+        }
+        let end = if edge(i) && quiet(i) { end_of(r, column, i, &edge) } else { None };
         match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
             Some(end) if channel != Channel::Pressure || is_unfelt(r, i..end, usual) => {
                 found.push(SensorFault {
@@ -57,6 +62,20 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
         }
     }
     found
+}
+
+/// The row that ends a spike which begins at `start`: a step away and back, shorter than a drop-out.
+fn end_of_spike(column: &[f64], start: usize, edge: impl Fn(usize) -> bool) -> Option<usize> {
+    if !edge(start) {
+        return None;
+    }
+    let (before, size) = (column[start - 1], column[start] - column[start - 1]);
+    let last = (start + SHORTEST).min(column.len());
+    (start + 1..last).find(|i| {
+        edge(*i)
+            && (column[*i] - column[*i - 1]) * size < 0.0
+            && (column[*i] - before).abs() <= BACK * size.abs()
+    })
 }
 
 /// Whether the force stays while the pressure reading is away.

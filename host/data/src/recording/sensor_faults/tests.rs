@@ -157,3 +157,45 @@ fn the_slack_muscle_of_the_shortest_length_is_not_a_dead_force() {
     };
     assert_eq!(faults(&Campaign::new((0..8).map(at).collect())), Vec::new());
 }
+
+#[test]
+fn readings_between_two_spikes_are_kept() {
+    for channel in [Channel::Pressure, Channel::Stroke, Channel::Force] {
+        let found = faults(&spoiled(5, channel, |c| {
+            let most = c.iter().copied().fold(0.0, f64::max);
+            (100..c.len()).step_by(173).for_each(|i| c[i] = 8.0 * most);
+        }));
+        let rows: usize = found.iter().map(|f| f.rows.len()).sum();
+        assert!(rows < 50, "{channel:?}: {found:?}");
+    }
+}
+
+/// Staircases of the pressure at held lengths: the shortened muscle pulls with a tenth of the largest force.
+#[test]
+fn a_pressure_of_zero_throughout_is_found_though_the_muscle_pulls_little() {
+    let staircase = |stroke: f64, run: usize| {
+        let rows = 1200;
+        let pressure: Vec<f64> =
+            (0..rows).map(|i| 600e3 * (1.0 - (1.0 - 2.0 * i as f64 / rows as f64).abs())).collect();
+        let force = pressure.iter().enumerate().map(|(i, p)| {
+            let noise = ((i * 37 + run * 11) % 17) as f64 * 0.05;
+            ((p - 40e3) * 7e-4 * (1.0 - 0.12 * stroke * 1e3 / 2.0)).max(0.0) + noise
+        });
+        Recording {
+            name: format!("{stroke} m, run {run}"),
+            force: Some(force.collect()),
+            stroke: vec![stroke; rows],
+            time: (0..rows).map(|i| i as f64 * 0.025).collect(),
+            pressure,
+            ..Recording::default()
+        }
+    };
+    let strokes = [0.0, 4e-3, 8e-3, 13.5e-3];
+    let mut all: Vec<Recording> =
+        strokes.iter().flat_map(|stroke| (0..3).map(|run| staircase(*stroke, run))).collect();
+    assert_eq!(faults(&Campaign::new(all.clone())), Vec::new());
+    all[10].pressure.fill(0.0);
+    let found = faults(&Campaign::new(all));
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!((found[0].recording, found[0].channel, found[0].kind), (10, Channel::Pressure, Kind::Dead));
+}

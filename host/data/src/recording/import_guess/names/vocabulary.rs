@@ -136,7 +136,7 @@ pub(super) const COMMANDED: &[&str] = &[
 ];
 /// Words of a length at rest.
 pub(super) const AT_REST: &[&str] = &["rest", "initial", "l0", "ruhe", "ruhelaenge", "resting"];
-/// Words of what is derived from a quantity: a standard deviation is no force.
+/// Words of what is derived from a quantity, or of another kind: a standard deviation is no force, and a diameter no stroke.
 pub(super) const DERIVED: &[&str] = &[
     "sd",
     "std",
@@ -167,6 +167,13 @@ pub(super) const DERIVED: &[&str] = &[
     "ambient",
     "barometric",
     "supply",
+    "diameter",
+    "durchmesser",
+    "radius",
+    "thickness",
+    "width",
+    "dicke",
+    "breite",
 ];
 /// Words that say nothing about which quantity it is.
 pub(super) const NEUTRAL: &[&str] = &[
