@@ -26,7 +26,6 @@ use pam_diagnose::remark::Remark;
 use pam_diagnose::{Diagnosis, Options, next_experiment::next_experiment, refitted_table};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
-use pam_fit::table_faults::table_faults;
 use pam_fit::{Fit, RecordingResidual, recording_table};
 
 use crate::progress::ProgressLine;
@@ -218,11 +217,6 @@ impl Arguments {
             return Ok(faults);
         }
         refitted.file.write(path)?;
-        let about = &refitted.file.about;
-        let faults = table_faults(&refitted.file.table, about.uncertainty.as_ref(), &about.fit);
-        if !faults.is_empty() {
-            console.warning(format!("{} is useless for control: {}", path.display(), faults.join(". ")));
-        }
         if let Some(reserve) = refitted.reserve {
             answer.remarks.push(Remark::Table { file: path.display().to_string(), reserve });
         } else if let Some((plain, with)) = refitted.left_out.filter(|(plain, with)| with < plain) {
