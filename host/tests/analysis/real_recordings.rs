@@ -9,6 +9,9 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Clock, Import, Reader};
+use pam_diagnose::Options as Diagnosing;
+use pam_diagnose::history::diagnose;
+use pam_diagnose::remark::Remark;
 use pam_evaluate::length_transfer::predict_unseen_length;
 use pam_fit::points;
 use pam_fit::pressures;
@@ -241,4 +244,23 @@ fn a_length_that_was_not_recorded_is_predicted_from_the_others() {
         println!("{year}: {mean:.2} %");
         assert!(bounds.contains(&mean), "{year}: {mean} %");
     }
+}
+
+/// A run whose force is in another unit is no reason to see no memory in the others, and none of its readings is taken for an error.
+#[test]
+fn one_run_with_a_failing_sensor_leaves_the_memory_of_the_others() {
+    let muscle = "festo10-2022-182mm.toml";
+    let Some(mut campaign) =
+        read("aarl-festo-10mm-2022", "festo10_cut200mm.csv", "festo-2022-staircase.toml", muscle)
+    else {
+        return;
+    };
+    if let Some(force) = &mut campaign.recordings[4].force {
+        force.iter_mut().for_each(|f| *f /= 4.448_222);
+    }
+    let muscle = MuscleDescription::read(project().join("examples/muscles").join(muscle)).unwrap();
+    let answer = diagnose(&campaign, &muscle.geometry(), &Diagnosing::default()).unwrap();
+    assert_eq!(answer.missing[0].effect, "log-creep", "{:?}", answer.missing);
+    assert!(answer.noise_N < 2.0, "{} N", answer.noise_N);
+    assert!(answer.remarks.iter().any(|r| matches!(r, Remark::Screening(_))), "{:?}", answer.remarks);
 }

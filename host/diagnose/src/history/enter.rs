@@ -38,13 +38,10 @@ pub fn is_from_history(missing: &Missing) -> bool {
 /// Recordings without force or without rows, or an impossible geometry.
 pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
     options.progress.stage("what the muscle remembers", 0);
-    let right = reliable(campaign);
-    let Some(mut found) = found(&among(campaign, &right), geometry) else {
+    let reliable = reliable_recordings(campaign);
+    let Some(found) = found(&reliable, geometry) else {
         return statically(campaign, geometry, options);
     };
-    // A recording that was left out has no shifts.
-    let mut shifts = std::mem::take(&mut found.shifts).into_iter();
-    found.shifts = right.iter().map(|r| if *r { shifts.next() } else { None }.unwrap_or_default()).collect();
     // What the user gives as known is fitted as it is, to the recordings as they are.
     if !(found.answer.named && options.given.is_empty()) {
         let mut diagnosis = statically(campaign, geometry, options)?;
@@ -52,36 +49,29 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         return Ok(diagnosis);
     }
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
-    let mut diagnosis = statically(&without_memory(campaign, &found), geometry, options)?;
+    let mut diagnosis = statically(&without_memory(&reliable, &found), geometry, options)?;
     enter(&mut diagnosis, found);
-    if let Some(misfit) = misfit(campaign, &braid)? {
+    if reliable.recordings.len() < campaign.recordings.len() {
+        diagnosis.remarks.extend(Screened::of(campaign).remark().map(Remark::Screening));
+    }
+    if let Some(misfit) = misfit(&reliable, &braid)? {
         diagnosis.misfit_rms_N = misfit;
     }
     Ok(diagnosis)
 }
 
-/// Which recordings may show a memory: those of which nearly all readings are free of sensor failures. A failing sensor changes one run
+/// The recordings that may show a memory: those of which nearly all readings are free of sensor failures. A failing sensor changes one run
 /// against the others, as a memory does.
-fn reliable(campaign: &Campaign) -> Vec<bool> {
+#[must_use]
+pub fn reliable_recordings(campaign: &Campaign) -> Campaign {
     let screened = Screened::of(campaign);
     let lost = |index: usize| {
         let read = screened.read(index);
         read.iter().filter(|read| !**read).count() as f64 / read.len().max(1) as f64
     };
-    (0..campaign.recordings.len()).map(|index| lost(index) <= MOST_LOST).collect()
-}
-
-/// The recordings of a campaign of which nearly all readings are free of sensor failures.
-#[must_use]
-pub fn reliable_recordings(campaign: &Campaign) -> Campaign {
-    among(campaign, &reliable(campaign))
-}
-
-/// The recordings of a campaign that are chosen.
-fn among(campaign: &Campaign, chosen: &[bool]) -> Campaign {
-    let recordings = campaign.recordings.iter().zip(chosen).filter(|(_, chosen)| **chosen);
+    let recordings = campaign.recordings.iter().enumerate().filter(|(index, _)| lost(*index) <= MOST_LOST);
     Campaign {
-        recordings: recordings.map(|(recording, _)| recording.clone()).collect(),
+        recordings: recordings.map(|(_, recording)| recording.clone()).collect(),
         clock: campaign.clock,
         warnings: campaign.warnings.clone(),
     }
