@@ -59,6 +59,7 @@ for called in host pam; do
 done
 "$work/pam" --quiet man -o "$tree/share/man/man1"
 cp LICENSE-APACHE LICENSE-MIT README.md CHANGELOG.md "$tree/share/doc/pam/"
+cp -r examples "$tree/share/doc/pam/"
 echo "$version" > "$tree/share/doc/pam/VERSION"
 python3 packaging/sbom.py ${target:+--target "$target"} --output "$tree/share/doc/pam/sbom.cdx.json"
 
@@ -74,6 +75,8 @@ if [ "$deb" = yes ] && [ -z "$suffix" ] && [ "${platform%%-*}" = linux ]; then
     cp -r "$tree/share" "$root/usr/share"
     rm "$root/usr/share/bash-completion/completions/host" "$root/usr/share/zsh/site-functions/_host" \
         "$root/usr/share/fish/vendor_completions.d/host.fish"
+    commands=$("$work/pam" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' | paste -sd'|')
+    sed -i -E "s/(^|[^a-z])host ($commands)([^a-z]|$)/\1pam \2\3/g" "$root/usr/share/doc/pam/README.md"
     gzip -9n "$root"/usr/share/man/man1/*.1
     cat LICENSE-MIT LICENSE-APACHE > "$root/usr/share/doc/pam/copyright"
     case "$machine" in x86_64) arch=amd64 ;; aarch64) arch=arm64 ;; *) arch=$machine ;; esac

@@ -26,6 +26,9 @@ if command -v dpkg-deb > /dev/null; then
     "$work/deb/usr/bin/pam" --version | grep -q "^pam " || fail "pam does not run from the Debian package"
     test ! -e "$work/deb/usr/bin/host" || fail "the Debian package would replace another package's host"
     test -s "$work/deb/usr/share/doc/pam/copyright" || fail "the Debian package lacks its licences"
+    grep -q "pam fit --muscle" "$work/deb/usr/share/doc/pam/README.md" || fail "the Debian package's README does not call pam"
+    if grep -q "host fit" "$work/deb/usr/share/doc/pam/README.md"; then fail "the Debian package's README calls host"; fi
+    test -d "$work/deb/usr/share/doc/pam/examples/imports" || fail "the Debian package lacks the examples"
     test -s "$work/deb/usr/share/man/man1/pam-fit.1.gz" || fail "the Debian package lacks manual pages"
 fi
 # Each package is named in the provenance with its own check sum, and the bill of materials lists what is in the program.

@@ -109,6 +109,11 @@ fn the_report_draws_the_fitted_lengths() {
     let page = pam_report::fit_page::page(&fitted, &campaign, &options);
     let figure = |id: &str| page.figures().find(|f| f.id == id).unwrap();
     assert!(figure("load-lines").reading.contains("fitted ones"));
+    for layer in &figure("errors").panels[0].layers {
+        if let pam_report::Mark::Series { x, .. } = &layer.mark {
+            assert!(x.windows(2).all(|w| w[0] < w[1]), "one error for each pressure: {x:?}");
+        }
+    }
     let pam_report::Mark::Series { y: residuals, .. } = &figure("residuals").panels[0].layers[0].mark else {
         panic!("each point is drawn");
     };

@@ -87,3 +87,30 @@ fn a_file_that_lacks_something_ends_with_status_1_and_the_list() {
     assert_eq!(none.status.code(), Some(1));
     assert!(text(&none.stderr).contains("no table of numbers"), "{}", text(&none.stderr));
 }
+
+/// A pipe gives its rows once, and the guess needs them several times.
+#[test]
+fn a_file_is_guessed_from_a_pipe() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..200)
+        .map(|i| {
+            format!("{:.2};{};{:.3};{}\n", 0.05 * f64::from(i), 300 + i % 3, 0.01 * f64::from(i), 90 - i % 60)
+        })
+        .collect();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(["import", "--guess", "-"])
+        .env("XDG_CONFIG_HOME", folder.path())
+        .env_remove("PAM_SETTINGS")
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let table = format!("t_s;p_kPa;x_mm;F_N\n{rows}");
+    child.stdin.take().unwrap().write_all(table.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("[columns.force]"));
+    assert!(text(&output.stderr).contains("1 recording;"), "{}", text(&output.stderr));
+}

@@ -145,6 +145,9 @@ fn repeats(view: &View<'_>) -> Vec<Repeat> {
     }
     blocks.retain(|(from, to)| (*from..*to).any(|i| view.fitted(i)));
     let mut out: Vec<Repeat> = Vec::new();
+    // Looked up once: there may be as many repeats as some thousandth of the points.
+    let longest = |group: usize| view.strokes(group, 2).last().copied().unwrap_or(0.0) / view.l0;
+    let reach: Vec<f64> = (0..view.levels.len()).map(longest).collect();
     let mut i = 0;
     while i + 1 < blocks.len() {
         let (a, b) = (blocks[i], blocks[i + 1]);
@@ -155,13 +158,13 @@ fn repeats(view: &View<'_>) -> Vec<Repeat> {
             continue;
         }
         let number = 1 + out.iter().filter(|r| r.group == group).count();
-        out.push(repeat(view, group, number, [a, b]));
+        out.push(repeat(view, group, reach[group], number, [a, b]));
         i += 2;
     }
     out
 }
 
-fn repeat(view: &View<'_>, group: usize, number: usize, branches: [(usize, usize); 2]) -> Repeat {
+fn repeat(view: &View<'_>, group: usize, reach: f64, number: usize, branches: [(usize, usize); 2]) -> Repeat {
     let at = &view.fit.summary.pressures[group];
     let pressure = view.levels[group];
     // The mid-line's distance from the table's, N, over points that `take` accepts: both branches have the same weight.
@@ -179,7 +182,6 @@ fn repeat(view: &View<'_>, group: usize, number: usize, branches: [(usize, usize
         }
         Some(sum)
     };
-    let reach = view.strokes(group, 2).last().copied().unwrap_or(0.0) / view.l0;
     let blocked = off(&|c| c < 0.1 * reach.max(0.01)).map(|d| at.blocked_force_N + d);
     let free = at.free_contraction.and_then(|free| {
         let shift = off(&|c| (c - free).abs() < 0.12 * free.max(0.01))?;

@@ -32,7 +32,7 @@ fn place(coordinate: &str, from: f64, to: f64) -> String {
             let zero = text.trim_start_matches(['-', '0', '.']).is_empty();
             text.trim_start_matches(|c| c == '-' && zero).to_owned()
         };
-        if (from - to).abs() < 1e-12 {
+        if number(from) == number(to) {
             format!("{}{unit}", number(from))
         } else {
             format!("{} to {}{unit}", number(from), number(to))
@@ -86,5 +86,6 @@ mod tests {
             "39 % of the excess error is at forces of 0.0 to 13.1 N, in 17 % of the rows"
         );
         assert!(region(&force(-0.06)).contains("-0.1 to 13.1 N"));
+        assert!(region(&force(13.06)).contains("at forces of 13.1 N,"));
     }
 }
