@@ -15,7 +15,6 @@ pub mod flash;
 pub mod fleet;
 pub mod health;
 pub mod history;
-mod implausible;
 pub mod import;
 mod interrupt;
 pub mod man;

@@ -12,7 +12,6 @@ use clap::{Args, FromArgMatches};
 use model_core::muscle::Muscle;
 
 use super::effects;
-use super::implausible;
 use super::recordings::Recordings;
 use super::reports::{self, Reports};
 use crate::console::Console;
@@ -26,11 +25,11 @@ use pam_diagnose::remark::Remark;
 use pam_diagnose::{Diagnosis, Options, next_experiment::next_experiment, refitted_table};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
+use pam_fit::table_faults::table_faults;
 use pam_fit::{Fit, RecordingResidual, recording_table};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
-use pam_fit::table_faults::table_faults;
 use pam_fit::table_file::{self, TableFile};
 use pam_report::{diagnose_page, document, history_text, wording};
 
@@ -66,9 +65,6 @@ pub struct Arguments {
     /// Write the table refitted with the named effects; corrections of the bench are stored separately.
     #[arg(short, long, value_name = "T2.pam")]
     output: Option<PathBuf>,
-    /// Write the table even if it is useless for control (negative P0 or friction, a large error, an inverse that fails).
-    #[arg(long, requires = "output")]
-    force: bool,
     /// Write the diagnosis as JSON to a file; `-` is standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -141,11 +137,8 @@ impl Arguments {
             self.reports.figures.as_deref(),
         ])?;
         let from = reports::provenance().muscle(&muscle).files(&self.recordings.files, &hashes);
-        let mut faults = Vec::new();
         match refitted {
-            Some(Ok(refitted)) => {
-                faults = self.with_model(console, &campaign, hashes, refitted, &mut answer)?
-            }
+            Some(Ok(refitted)) => self.with_model(console, &campaign, hashes, refitted, &mut answer)?,
             // Without a requested table a failed refit only costs the advice.
             Some(Err(e)) if self.output.is_some() => return Err(e),
             Some(Err(e)) => answer.remarks.push(Remark::NoAdvice(e.to_string())),
@@ -169,7 +162,7 @@ impl Arguments {
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
-        implausible::judge(&faults, self.force, true, console)
+        Ok(())
     }
 
     /// The table with the named effects, where it is written or the advice depends on it.
@@ -187,7 +180,6 @@ impl Arguments {
         })
     }
 
-    /// Writes the table, and returns what makes it useless for control.
     fn with_model(
         &self,
         console: &Console,
@@ -195,7 +187,7 @@ impl Arguments {
         hashes: Vec<String>,
         mut refitted: refitted_table::Refitted,
         answer: &mut Diagnosis,
-    ) -> Result<Vec<String>> {
+    ) -> Result<()> {
         let tested = refitted.file.table.tested;
         let (low, high) = (tested.pressure_low.pascals(), tested.pressure_high.pascals());
         if let Ok(muscle) = Muscle::<f64>::build(&refitted.file.table) {
@@ -204,19 +196,19 @@ impl Arguments {
         if let (Some(path), Some(next)) = (&self.next, &answer.next_experiment) {
             write_whole(path, next.protocol.as_bytes())?;
         }
-        let Some(path) = &self.output else { return Ok(Vec::new()) };
+        let Some(path) = &self.output else { return Ok(()) };
         for warning in &refitted.warnings {
             console.detail(warning);
         }
         let files = &self.recordings.files;
         refitted.file.about.date = date::now_utc();
         refitted.file.about.sources = table_file::sources(campaign, files, hashes);
+        refitted.file.write(path)?;
         let about = &refitted.file.about;
         let faults = table_faults(&refitted.file.table, about.uncertainty.as_ref(), &about.fit);
-        if !faults.is_empty() && !self.force {
-            return Ok(faults);
+        if !faults.is_empty() {
+            console.warning(format!("{} is useless for control: {}", path.display(), faults.join(". ")));
         }
-        refitted.file.write(path)?;
         if let Some(reserve) = refitted.reserve {
             answer.remarks.push(Remark::Table { file: path.display().to_string(), reserve });
         } else if let Some((plain, with)) = refitted.left_out.filter(|(plain, with)| with < plain) {
@@ -232,7 +224,7 @@ impl Arguments {
                 refitted.rms_before
             ));
         }
-        Ok(faults)
+        Ok(())
     }
 }
 

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::implausible;
 use super::recordings::Recordings;
 use super::reports::{self, Reports};
 use crate::console::Console;
@@ -19,6 +18,7 @@ use pam_fit::{Options, Summary, fit_with_progress};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::Reader;
+use pam_fit::error::FitCode;
 use pam_fit::table_file::{self, TableFile};
 use pam_report::fit_page;
 
@@ -114,7 +114,7 @@ impl Arguments {
             console.note(fitted.summary.to_string());
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
-        implausible::judge(&fitted.summary.faults, self.force, self.output.is_some(), console)
+        self.judge(&fitted.summary.faults, console)
     }
 
     fn check_smoothing(&self) -> Result<()> {
@@ -150,5 +150,21 @@ impl Arguments {
             Some(path) => write_whole(path, format!("{json}\n").as_bytes()),
             None => Ok(()),
         }
+    }
+
+    /// A table with faults is an error, or a warning with `--force`.
+    fn judge(&self, faults: &[String], console: &Console) -> Result<()> {
+        if faults.is_empty() {
+            return Ok(());
+        }
+        if self.force {
+            console.warning(format!("the table is useless for control: {}", faults.join(". ")));
+            return Ok(());
+        }
+        let unwritten = if self.output.is_some() { ", and it was not written" } else { "" };
+        Err(Error::new(
+            FitCode::FitImplausible,
+            format!("the table is useless for control{unwritten}: {}", faults.join(". ")),
+        ))
     }
 }
