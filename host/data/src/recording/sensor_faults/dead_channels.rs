@@ -9,6 +9,8 @@ const DEAD: f64 = 0.02;
 const PULLS: f64 = 0.2;
 /// In at least this share of the rows.
 const ROWS: f64 = 0.3;
+/// The same where no reading scatters.
+const ROWS_UNUSUALLY: f64 = 0.15;
 /// A force that changes by this share of the range, beyond what pressure and stroke explain.
 const UNEXPLAINED: f64 = 0.25;
 
@@ -78,7 +80,9 @@ fn is_dead(r: &Recording, channel: Channel, usual: &Usual) -> bool {
             let least = usual.noticeable_unusually();
             middle.abs() < DEAD * usual.top_pressure
                 && (share(&|i| pull(i) > PULLS * usual.spans[2]) > ROWS
-                    || spread <= 0.0 && share(&|i| pull(i).min(usual.expected.residual(r, i)) > least) > ROWS)
+                    || spread <= 0.0
+                        && share(&|i| pull(i) > least && usual.expected.residual(r, i) > 0.5 * least)
+                            > ROWS_UNUSUALLY)
         }
         Channel::Force => {
             let expected = |i: usize| usual.expected.at(r, i) - middle;
