@@ -1,4 +1,4 @@
-//! What a guess reports to the user, with its subject: later steps select by the subject, never by the words.
+//! What `import --guess` reports to the user, with its subject: later steps select by the subject, never by the words.
 
 use std::fmt;
 
