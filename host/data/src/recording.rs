@@ -34,6 +34,7 @@ mod quantity;
 mod read;
 pub mod sensor_faults;
 mod source;
+mod spikes;
 mod stroke_zero;
 mod tdms;
 mod thousands;

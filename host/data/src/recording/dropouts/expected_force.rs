@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::steps::Stretch;
 use crate::recording::force_surface::{ForceSurface, TERMS};
+use crate::recording::spikes::spikes;
 use crate::recording::{Campaign, Recording, white_noise};
-use crate::statistics::median;
+use crate::statistics::{median, quantile};
 
 /// Rows that the surface is fitted to.
 const ROWS: usize = 20_000;
@@ -26,6 +27,10 @@ const FOLLOWS: f64 = 0.15;
 const SUPPORTED: f64 = 0.3;
 /// How long after a stretch the force is checked for a late reaction: s, and rows at least.
 const LATE: (f64, usize) = (0.3, 2);
+/// A spike of the pressure is at least this share of the usual highest pressure. Few spikes far away would bend the surface.
+const SPIKE: f64 = 0.1;
+/// The usual highest pressure is exceeded by this share of the rows.
+const RARE: f64 = 0.01;
 /// Rows on either side that determine the level.
 const BESIDE: usize = 5;
 /// A saturated force sensor repeats one value in at least this share of the rows.
@@ -44,18 +49,29 @@ pub(in crate::recording) struct ExpectedForce {
     ceiling: f64,
 }
 
+/// The highest pressure but for few readings, Pa.
+fn usual_pressure(campaign: &Campaign, stride: usize) -> f64 {
+    let rows = campaign.recordings.iter().flat_map(|r| r.pressure.iter().step_by(stride));
+    let mut sizes: Vec<f64> = rows.map(|p| p.abs()).collect();
+    if sizes.is_empty() { 0.0 } else { quantile(&mut sizes, 1.0 - RARE) }
+}
+
 impl ExpectedForce {
     /// `None` where too few rows pull, or the force hardly changes.
     pub(in crate::recording) fn of(campaign: &Campaign, masks: &[Vec<Range<usize>>]) -> Option<Self> {
         let total = campaign.samples();
         let stride = (total / ROWS).max(1);
         let mut rows: Vec<[f64; 3]> = Vec::with_capacity(total / stride + 1);
+        let step = SPIKE * usual_pressure(campaign, stride);
         for (r, mask) in campaign.recordings.iter().zip(masks) {
             let Some(force) = r.force.as_deref() else { continue };
-            let mut next = mask.iter().peekable();
+            let spikes = spikes(&r.pressure, step);
+            let (mut next, mut spike) = (mask.iter().peekable(), spikes.iter().peekable());
             for i in (0..r.len()).step_by(stride) {
                 while next.next_if(|m| m.end <= i).is_some() {}
-                if next.peek().is_none_or(|m| i < m.start) {
+                while spike.next_if(|s| s.end <= i).is_some() {}
+                let away = spike.peek().is_some_and(|s| s.contains(&i));
+                if !away && next.peek().is_none_or(|m| i < m.start) {
                     rows.push([r.pressure[i], r.stroke[i], force[i]]);
                 }
             }

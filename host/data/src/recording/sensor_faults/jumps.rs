@@ -1,7 +1,11 @@
 //! Drop-outs: the reading steps away within one row and back within one row, and no other reading steps. A step of the pressure must change
-//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less).
+//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes of the pressure are found by
+//! the same; those of the force are outliers of a fit.
+
+use std::ops::Range;
 
 use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
+use crate::recording::spikes::{self, end_of_spike};
 use crate::recording::white_noise;
 
 /// A step is at least this share of the column's range, and this many standard deviations of a reading.
@@ -12,8 +16,6 @@ const BACK: f64 = 0.25;
 const STEADY: f64 = 0.25;
 /// The other columns change by less than this share of their range over the row of a step.
 const OTHERS: f64 = 0.05;
-/// Shorter drop-outs are spikes, which the outliers of the fit find.
-const SHORTEST: usize = 4;
 /// What lasts longer, s, is how the bench was driven.
 const LONGEST: f64 = 10.0;
 
@@ -42,20 +44,17 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     let mut i = 1;
     while i < column.len() {
         // What lies between two spikes is no drop-out.
-        if let Some(end) = end_of_spike(column, i, &edge) {
+        if let Some(end) = end_of_spike(column, i, step) {
+            if channel == Channel::Pressure && is_unfelt(r, i..end, usual) {
+                found.push(drop_out(index, i..end, channel, column[i]));
+            }
             i = end + 1;
             continue;
         }
         let end = if edge(i) && quiet(i) { end_of(r, column, i, &edge) } else { None };
         match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
             Some(end) if channel != Channel::Pressure || is_unfelt(r, i..end, usual) => {
-                found.push(SensorFault {
-                    recording: index,
-                    rows: i..end,
-                    channel,
-                    kind: Kind::DropOut,
-                    value: column[i],
-                });
+                found.push(drop_out(index, i..end, channel, column[i]));
                 i = end + 1;
             }
             _ => i += 1,
@@ -64,22 +63,12 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     found
 }
 
-/// The row that ends a spike which begins at `start`: a step away and back, shorter than a drop-out.
-fn end_of_spike(column: &[f64], start: usize, edge: impl Fn(usize) -> bool) -> Option<usize> {
-    if !edge(start) {
-        return None;
-    }
-    let (before, size) = (column[start - 1], column[start] - column[start - 1]);
-    let last = (start + SHORTEST).min(column.len());
-    (start + 1..last).find(|i| {
-        edge(*i)
-            && (column[*i] - column[*i - 1]) * size < 0.0
-            && (column[*i] - before).abs() <= BACK * size.abs()
-    })
+fn drop_out(recording: usize, rows: Range<usize>, channel: Channel, value: f64) -> SensorFault {
+    SensorFault { recording, rows, channel, kind: Kind::DropOut, value }
 }
 
 /// Whether the force stays while the pressure reading is away.
-fn is_unfelt(r: &Recording, rows: std::ops::Range<usize>, usual: &Usual) -> bool {
+fn is_unfelt(r: &Recording, rows: Range<usize>, usual: &Usual) -> bool {
     let made = (usual.expected.at(r, rows.start) - usual.expected.at(r, rows.start - 1)).abs();
     let force = r.force.as_deref().unwrap_or(&[]);
     let (low, high) = force[rows.start - 1..=rows.end]
@@ -96,7 +85,7 @@ fn end_of(r: &Recording, column: &[f64], start: usize, edge: impl Fn(usize) -> b
             return None;
         }
         if edge(i) && (column[i] - column[i - 1]) * size < 0.0 {
-            return (i - start >= SHORTEST).then_some(i);
+            return (i - start >= spikes::LONGEST).then_some(i);
         }
         if (column[i] - column[start]).abs() > STEADY * size.abs() {
             return None;
@@ -106,13 +95,7 @@ fn end_of(r: &Recording, column: &[f64], start: usize, edge: impl Fn(usize) -> b
 }
 
 /// Whether the reading after continues the one before.
-fn returns(
-    r: &Recording,
-    channel: Channel,
-    column: &[f64],
-    rows: std::ops::Range<usize>,
-    usual: &Usual,
-) -> bool {
+fn returns(r: &Recording, channel: Channel, column: &[f64], rows: Range<usize>, usual: &Usual) -> bool {
     let (before, after) = (rows.start - 1, rows.end);
     let size = (column[rows.start] - column[before]).abs();
     let expected = match channel {
