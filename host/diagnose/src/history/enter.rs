@@ -38,7 +38,12 @@ pub fn is_from_history(missing: &Missing) -> bool {
 /// Recordings without force or without rows, or an impossible geometry.
 pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
     options.progress.stage("what the muscle remembers", 0);
-    let reliable = reliable_recordings(campaign);
+    // Most campaigns move: they are not copied.
+    if campaign.mountings().is_none() {
+        return statically(campaign, geometry, options);
+    }
+    let screened = Screened::of(campaign);
+    let reliable = reliable(&screened);
     let Some(found) = found(&reliable, geometry) else {
         return statically(campaign, geometry, options);
     };
@@ -51,8 +56,10 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
     let mut diagnosis = statically(&without_memory(&reliable, &found), geometry, options)?;
     enter(&mut diagnosis, found);
-    if reliable.recordings.len() < campaign.recordings.len() {
-        diagnosis.remarks.extend(Screened::of(campaign).remark().map(Remark::Screening));
+    // The failures were taken out before.
+    if let Some(failures) = screened.remark() {
+        diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
+        diagnosis.remarks.push(Remark::Screening(failures));
     }
     if let Some(misfit) = misfit(&reliable, &braid)? {
         diagnosis.misfit_rms_N = misfit;
@@ -60,11 +67,16 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     Ok(diagnosis)
 }
 
-/// The recordings that may show a memory: those of which nearly all readings are free of sensor failures. A failing sensor changes one run
-/// against the others, as a memory does.
+/// The recordings that may show a memory.
 #[must_use]
 pub fn reliable_recordings(campaign: &Campaign) -> Campaign {
-    let screened = Screened::of(campaign);
+    reliable(&Screened::of(campaign))
+}
+
+/// Those of which nearly all readings are free of sensor failures, with the others bridged. A failing sensor changes one run against the
+/// others, as a memory does.
+fn reliable(screened: &Screened<'_>) -> Campaign {
+    let campaign = screened.campaign.as_ref();
     let lost = |index: usize| {
         let read = screened.read(index);
         read.iter().filter(|read| !**read).count() as f64 / read.len().max(1) as f64
