@@ -27,9 +27,9 @@ const FOLLOWS: f64 = 0.15;
 const SUPPORTED: f64 = 0.3;
 /// How long after a stretch the force is checked for a late reaction: s, and rows at least.
 const LATE: (f64, usize) = (0.3, 2);
-/// A spike of the pressure is at least this share of the usual highest pressure. Few spikes far away would bend the surface.
+/// A spike of pressure or stroke is at least this share of the usual range. Few spikes far away would bend the surface.
 const SPIKE: f64 = 0.1;
-/// The usual highest pressure is exceeded by this share of the rows.
+/// This share of the rows lies above the usual range, and as much below.
 const RARE: f64 = 0.01;
 /// Rows on either side that determine the level.
 const BESIDE: usize = 5;
@@ -49,11 +49,11 @@ pub(in crate::recording) struct ExpectedForce {
     ceiling: f64,
 }
 
-/// The highest pressure but for few readings, Pa.
-fn usual_pressure(campaign: &Campaign, stride: usize) -> f64 {
-    let rows = campaign.recordings.iter().flat_map(|r| r.pressure.iter().step_by(stride));
-    let mut sizes: Vec<f64> = rows.map(|p| p.abs()).collect();
-    if sizes.is_empty() { 0.0 } else { quantile(&mut sizes, 1.0 - RARE) }
+/// The range of a column without few readings far away, SI.
+fn usual_span(campaign: &Campaign, of: fn(&Recording) -> &[f64], stride: usize) -> f64 {
+    let mut some: Vec<f64> =
+        campaign.recordings.iter().flat_map(|r| of(r).iter().step_by(stride)).copied().collect();
+    if some.is_empty() { 0.0 } else { quantile(&mut some, 1.0 - RARE) - quantile(&mut some, RARE) }
 }
 
 impl ExpectedForce {
@@ -62,16 +62,20 @@ impl ExpectedForce {
         let total = campaign.samples();
         let stride = (total / ROWS).max(1);
         let mut rows: Vec<[f64; 3]> = Vec::with_capacity(total / stride + 1);
-        let step = SPIKE * usual_pressure(campaign, stride);
+        let pressure_step = SPIKE * usual_span(campaign, |r| &r.pressure, stride);
+        let stroke_step = SPIKE * usual_span(campaign, |r| &r.stroke, stride);
         for (r, mask) in campaign.recordings.iter().zip(masks) {
             let Some(force) = r.force.as_deref() else { continue };
-            let spikes = spikes(&r.pressure, step);
-            let (mut next, mut spike) = (mask.iter().peekable(), spikes.iter().peekable());
+            let away = [spikes(&r.pressure, pressure_step), spikes(&r.stroke, stroke_step)];
+            let mut next = mask.iter().peekable();
+            let mut away = away.each_ref().map(|spikes| spikes.iter().peekable());
             for i in (0..r.len()).step_by(stride) {
                 while next.next_if(|m| m.end <= i).is_some() {}
-                while spike.next_if(|s| s.end <= i).is_some() {}
-                let away = spike.peek().is_some_and(|s| s.contains(&i));
-                if !away && next.peek().is_none_or(|m| i < m.start) {
+                let spiked = away.each_mut().map(|spikes| {
+                    while spikes.next_if(|s| s.end <= i).is_some() {}
+                    spikes.peek().is_some_and(|s| s.contains(&i))
+                });
+                if spiked == [false; 2] && next.peek().is_none_or(|m| i < m.start) {
                     rows.push([r.pressure[i], r.stroke[i], force[i]]);
                 }
             }

@@ -1,6 +1,6 @@
 //! Drop-outs: the reading steps away within one row and back within one row, and no other reading steps. A step of the pressure must change
-//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes of the pressure are found by
-//! the same; those of the force are outliers of a fit.
+//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes of pressure and stroke are found
+//! by the same; those of the force are outliers of a fit.
 
 use std::ops::Range;
 
@@ -45,7 +45,12 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     while i < column.len() {
         // What lies between two spikes is no drop-out.
         if let Some(end) = end_of_spike(column, i, step) {
-            if channel == Channel::Pressure && is_unfelt(r, i..end, usual) {
+            let failed = match channel {
+                Channel::Pressure => is_unfelt(r, i..end, usual),
+                Channel::Stroke => quiet(i) && quiet(end),
+                Channel::Force => false,
+            };
+            if failed {
                 found.push(drop_out(index, i..end, channel, column[i]));
             }
             i = end + 1;

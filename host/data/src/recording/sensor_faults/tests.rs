@@ -171,19 +171,21 @@ fn readings_between_two_spikes_are_kept() {
     }
 }
 
-/// The force does not follow a pressure that is read for one row.
+/// The force does not follow a pressure or a stroke that is read for one row.
 #[test]
-fn spikes_of_the_pressure_are_found() {
-    for size in [1.0, 5.0, 20.0] {
-        let campaign = spoiled(5, Channel::Pressure, |c| {
+fn spikes_of_pressure_and_stroke_are_found() {
+    for (channel, size) in
+        [Channel::Pressure, Channel::Stroke].into_iter().flat_map(|c| [(c, 1.0), (c, 5.0), (c, 20.0)])
+    {
+        let campaign = spoiled(5, channel, |c| {
             let most = c.iter().copied().fold(0.0, f64::max);
             (100..c.len()).step_by(173).for_each(|i| c[i] += size * most);
         });
         let screened = Screened::of(&campaign);
         let rows = |index: usize| screened.of_recording(index).map(|rows| rows.len()).sum::<usize>();
         let spikes = (1600 - 100) / 173 + 1;
-        assert!((8 * spikes / 10..=spikes).contains(&rows(2)), "{size}: {} of {spikes}", rows(2));
-        assert_eq!([0, 1, 3, 4, 5].map(rows), [0; 5], "{size}");
+        assert!((8 * spikes / 10..=spikes).contains(&rows(2)), "{channel:?} {size}: {} of {spikes}", rows(2));
+        assert_eq!([0, 1, 3, 4, 5].map(rows), [0; 5], "{channel:?} {size}");
     }
 }
 
