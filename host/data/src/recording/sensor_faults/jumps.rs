@@ -47,7 +47,7 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
         if let Some(end) = end_of_spike(column, i, step) {
             let failed = match channel {
                 Channel::Pressure => is_unfelt(r, i..end, usual),
-                Channel::Stroke => quiet(i) && quiet(end),
+                Channel::Stroke => is_unfelt(r, i..end, usual) || quiet(i) && quiet(end),
                 Channel::Force => false,
             };
             if failed {
@@ -72,7 +72,7 @@ fn drop_out(recording: usize, rows: Range<usize>, channel: Channel, value: f64) 
     SensorFault { recording, rows, channel, kind: Kind::DropOut, value }
 }
 
-/// Whether the force stays while the pressure reading is away.
+/// Whether the force stays while the reading of pressure or stroke is away, though the expected force does not.
 fn is_unfelt(r: &Recording, rows: Range<usize>, usual: &Usual) -> bool {
     let made = (usual.expected.at(r, rows.start) - usual.expected.at(r, rows.start - 1)).abs();
     let force = r.force.as_deref().unwrap_or(&[]);
