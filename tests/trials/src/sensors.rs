@@ -61,6 +61,14 @@ fn lose(column: &mut [f64], rows: Range<usize>) {
     column[rows.start..rows.start + 20].fill(0.0);
 }
 
+/// Single readings that are too high by half to twice the column's largest.
+fn spikes(column: &mut [f64], rows: Range<usize>) {
+    let largest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    for (k, row) in rows.step_by(100).enumerate() {
+        column[row] += largest * [0.5, 1.0, 2.0][k % 3];
+    }
+}
+
 fn cut(column: &mut [f64], _: Range<usize>) {
     let largest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     column.iter_mut().for_each(|v| *v = v.min(0.6 * largest));
@@ -74,7 +82,7 @@ fn unit(column: &mut [f64], factor: f64) {
     column.iter_mut().for_each(|v| *v *= factor);
 }
 
-const WAYS: [Way; 18] = [
+const WAYS: [Way; 21] = [
     Way { name: "frozen for 500 rows", channel: Channel::Force, protocol: "A", spoil: freeze, bounded: true },
     Way {
         name: "frozen for 500 rows",
@@ -111,6 +119,15 @@ const WAYS: [Way; 18] = [
         spoil: lose,
         bounded: true,
     },
+    Way { name: "five spikes", channel: Channel::Pressure, protocol: "A", spoil: spikes, bounded: true },
+    Way {
+        name: "five spikes",
+        channel: Channel::Pressure,
+        protocol: "staircase",
+        spoil: spikes,
+        bounded: true,
+    },
+    Way { name: "five spikes", channel: Channel::Stroke, protocol: "A", spoil: spikes, bounded: true },
     Way {
         name: "lbf for N",
         channel: Channel::Force,
