@@ -8,22 +8,26 @@ use std::fmt::Write as _;
 const INTRODUCTION: &str = "# Trials of automatic campaigns\n\nThis command wrote this page; nothing on it is typed by hand:\n\n\
     ```text\ncargo run --release -p trials -- campaign -o DIR --page docs/src/proof-campaign.md\n```\n\n";
 
-/// The section on the diagnosis; the first column of its table counts resolved campaigns.
+/// The section on the diagnosis.
 const DIAGNOSIS: &str = "## Diagnosis\n\n\"Only the right name\": at least one effect is named, every name is without competitors, and every \
-    name is a hidden effect; of two hidden effects one may be missing.\n\n\
-    | method | muscles | only the right name | class right | truth in the set, where a name is given | nothing named | false alarms |\n";
+    name is a hidden effect; of two hidden effects one may be missing.\n\n";
+
+/// The head of its table; the third column counts resolved campaigns.
+const COLUMNS: &str = "| method | muscles | only the right name | class right | truth in the set, where a name is given | nothing named | false alarms |\n\
+    | --- | --- | --- | --- | --- | --- | --- |\n";
 
 /// The page; `drawn` is the number of muscles in the whole set.
 pub fn page(all: &[Trial], drawn: usize) -> String {
     let mut m = format!(
         "{INTRODUCTION}The muscles of the virtual bench have one hidden effect, two, or none, of 1 to 6 % of the blocked force (seed {SEED}). \
          Each method has {:.0} minutes of bench time, and all recordings get the same diagnosis. The bounds and the seed were committed before \
-         the first scored run. Rates have exact 95 % intervals. The set has {drawn} muscles, tested in its order; \"muscles\" counts those that a method has had, with and without effects.\n\n{DIAGNOSIS}",
+         the first scored run. Rates have exact 95 % intervals. The set has {drawn} muscles, tested in its order; \"muscles\" counts \
+         those that a method has had, with and without effects.\n\n{DIAGNOSIS}",
         BENCH_S / 60.0
     );
     let with: Vec<&Trial> = all.iter().filter(|t| !t.truth.is_empty()).collect();
     let without: Vec<&Trial> = all.iter().filter(|t| t.truth.is_empty()).collect();
-    m += "| --- | --- | --- | --- | --- | --- | --- |\n";
+    m += COLUMNS;
     // Writing to a string cannot fail.
     let _ =
         writeln!(m, "| bound | | {} | {} | {} | | {} |", BOUNDS[0].1, BOUNDS[1].1, BOUNDS[2].1, BOUNDS[3].1);
