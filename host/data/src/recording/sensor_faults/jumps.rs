@@ -56,7 +56,7 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
             i = end + 1;
             continue;
         }
-        let end = if edge(i) && quiet(i) { end_of(r, column, i, &edge) } else { None };
+        let end = if edge(i) && quiet(i) { end_of(r, column, i, edge) } else { None };
         match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
             Some(end) if channel != Channel::Pressure || is_unfelt(r, i..end, usual) => {
                 found.push(drop_out(index, i..end, channel, column[i]));
