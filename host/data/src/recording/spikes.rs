@@ -4,8 +4,8 @@ use std::ops::Range;
 
 /// What lasts as many rows is no spike.
 pub(super) const LONGEST: usize = 4;
-/// The row after differs from the row before by less than this share of the step.
-const BACK: f64 = 0.25;
+/// The row after differs from the row before by less than this share of the step, beyond what was to be expected.
+pub(super) const BACK: f64 = 0.25;
 
 /// The row that ends a spike which begins at `start`; `step` is the least change from row to row.
 pub(super) fn end_of_spike(column: &[f64], start: usize, step: f64) -> Option<usize> {

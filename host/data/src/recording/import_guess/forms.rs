@@ -68,7 +68,7 @@ pub(super) fn find<'a>(
         let first = column.first_text.as_deref().unwrap_or_default();
         if first.matches('/').count() == 2 {
             dates(column, first, &cells(n), forms, &mut found);
-        } else if column.name.quantity().is_some() {
+        } else if column.named_for().is_some() {
             separators(column, first, &cells(n), forms, &mut found);
         }
     }

@@ -4,7 +4,7 @@ use regex_lite::{Regex, escape};
 
 use super::names::RUNS;
 use super::others::Others;
-use super::sample::Sample;
+use super::sample::{Sample, SampleColumn};
 use super::values::{PRESSURES, doubt};
 use super::{Guess, GuessedPattern, Note};
 use crate::recording::quantity::Unit;
@@ -35,7 +35,7 @@ enum Found {
 /// Takes the pressure from the lines above the table or from the names of the files.
 pub(super) fn find(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
     let named = sample.columns.iter().filter(|c| !c.name.is_raw());
-    let mut named = named.filter_map(|c| c.name.quantity().map(|(quantity, _)| quantity));
+    let mut named = named.filter_map(SampleColumn::named_for);
     // A column of pressure that cannot be read is a mistake in the file, and no reason to look elsewhere.
     if guess.has(Quantity::Pressure) || named.any(|quantity| quantity == Quantity::Pressure) {
         return;

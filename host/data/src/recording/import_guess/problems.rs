@@ -9,7 +9,7 @@ use crate::recording::Quantity;
 /// Columns that are named for a quantity and hold cells that are no numbers.
 pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
     for column in &sample.columns {
-        let Some((quantity, _)) = column.name.quantity() else { continue };
+        let Some(quantity) = column.named_for() else { continue };
         let told = guess.unknown.iter().any(|note| note.is_on_column(&column.header));
         let coded = matches!(quantity, Quantity::Direction | Quantity::Cycle);
         if column.texts == 0 || coded || told || guess.has(quantity) {

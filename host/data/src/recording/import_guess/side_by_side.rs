@@ -8,7 +8,7 @@ use crate::recording::Quantity;
 /// file would pass for all of it. `false` where there is one recording.
 pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) -> bool {
     let named = |quantity: Quantity| -> Vec<usize> {
-        let is = |n: &usize| sample.columns[*n].name.quantity().is_some_and(|(q, _)| q == quantity);
+        let is = |n: &usize| sample.columns[*n].named_for() == Some(quantity);
         (0..sample.columns.len()).filter(is).collect()
     };
     let [times, pressures, forces] = [Quantity::Time, Quantity::Pressure, Quantity::Force].map(named);
@@ -53,9 +53,8 @@ fn describe(sample: &Sample, recordings: usize, step: usize, used: &mut [bool], 
     let alike = |n: usize, other: usize| {
         let (a, b) = (&sample.columns[n], sample.columns.get(other));
         b.is_some_and(|b| {
-            let quantity = |c: &super::sample::SampleColumn| c.name.quantity().map(|(q, _)| q);
             let unit = |c: &super::sample::SampleColumn| c.name.unit.map(|u| u.text);
-            quantity(a) == quantity(b) && unit(a) == unit(b)
+            a.named_for() == b.named_for() && unit(a) == unit(b)
         })
     };
     let all: Vec<usize> = (1..recordings).flat_map(|k| own.iter().map(move |n| n + k * step)).collect();

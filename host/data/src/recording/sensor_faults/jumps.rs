@@ -10,8 +10,6 @@ use crate::recording::white_noise;
 
 /// A step is at least this share of the column's range, and this many standard deviations of a reading.
 const STEP: (f64, f64) = (0.06, 12.0);
-/// The row after differs from the row before by less than this share of the step, beyond what was to be expected.
-const BACK: f64 = 0.25;
 /// Within a drop-out the reading changes by less than this share of the step from its first value.
 const STEADY: f64 = 0.25;
 /// The other columns change by less than this share of their range over the row of a step.
@@ -120,5 +118,5 @@ fn returns(r: &Recording, channel: Channel, column: &[f64], rows: Range<usize>, 
         Channel::Force => expected.abs() + 2.0 * usual.residual,
         Channel::Pressure => 0.0,
     };
-    change.abs() <= BACK * size + around
+    change.abs() <= spikes::BACK * size + around
 }
