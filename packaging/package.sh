@@ -80,6 +80,13 @@ if [ "$deb" = yes ] && [ -z "$suffix" ] && [ "${platform%%-*}" = linux ]; then
     gzip -9n "$root"/usr/share/man/man1/*.1
     cat LICENSE-MIT LICENSE-APACHE > "$root/usr/share/doc/pam/copyright"
     case "$machine" in x86_64) arch=amd64 ;; aarch64) arch=arm64 ;; *) arch=$machine ;; esac
+    # A dynamic binary names its interpreter at its beginning, and the symbol versions of the C library that it needs.
+    depends=""
+    if head -c 4096 "$binary" | grep -aq "/ld-linux"; then
+        glibc=$(grep -ao 'GLIBC_[0-9.]*[0-9]' "$binary" | sort -Vu | tail -n 1)
+        depends="Depends: libc6 (>= ${glibc#GLIBC_})"
+        if grep -aq 'libgcc_s\.so\.1' "$binary"; then depends="$depends, libgcc-s1"; fi
+    fi
     cat > "$root/DEBIAN/control" <<CONTROL
 Package: pam
 Version: $version
@@ -87,7 +94,8 @@ Architecture: $arch
 Maintainer: The authors of the program <maintainers@localhost>
 Section: science
 Priority: optional
-Description: tables, control and diagnosis of pneumatic artificial muscles
+${depends:+$depends
+}Description: tables, control and diagnosis of pneumatic artificial muscles
  Fits the table of a pneumatic artificial muscle to recordings, sends it to a
  controller, and finds what the model leaves out.
 CONTROL

@@ -23,6 +23,12 @@ fi
 
 if command -v dpkg-deb > /dev/null; then
     dpkg-deb -x "$work"/dist/pam_*.deb "$work/deb"
+    needs=$(dpkg-deb -f "$work"/dist/pam_*.deb Depends)
+    if ldd "$work/deb/usr/bin/pam" 2> /dev/null | grep -q "libc\.so"; then
+        case "$needs" in "libc6 (>= 2."*) ;; *) fail "the Debian package of a dynamic binary names no C library: $needs" ;; esac
+    elif [ -n "$needs" ]; then
+        fail "the Debian package of a static binary depends on $needs"
+    fi
     "$work/deb/usr/bin/pam" --version | grep -q "^pam " || fail "pam does not run from the Debian package"
     test ! -e "$work/deb/usr/bin/host" || fail "the Debian package would replace another package's host"
     test -s "$work/deb/usr/share/doc/pam/copyright" || fail "the Debian package lacks its licences"

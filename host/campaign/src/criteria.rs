@@ -2,6 +2,9 @@
 
 /// Highest pressure of a campaign, as a share of the muscle's rated pressure. The protocols of the virtual bench end there, too.
 pub const TOP_SHARE: f64 = 0.9;
+/// Largest force of the ideal braid at the highest level, as a share of what rig and controller allow: friction, noise, and an error of the
+/// braid angle of a degree do not reach the limit then.
+pub const FORCE_SHARE: f64 = 0.9;
 /// Lowest level at least, as a share of the highest (the virtual bench's protocols).
 pub const BOTTOM_SHARE: f64 = 1.0 / 6.0;
 /// Lowest level at least, in deadbands: below it the muscle hardly moves (the virtual bench's protocols).

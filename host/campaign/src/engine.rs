@@ -280,10 +280,8 @@ impl Engine {
 
     /// One blocked force for one campaign: that of the table.
     fn agree(&mut self) {
-        if let (Some(diagnosis), Some(findings)) = (&mut self.diagnosis, &self.findings)
-            && diagnosis.judged()
-        {
-            diagnosis.blocked_force_N = findings.fit.summary.blocked_force_N;
+        if let (Some(diagnosis), Some(findings)) = (&mut self.diagnosis, &self.findings) {
+            diagnosis.adopt_blocked_force(findings.fit.summary.blocked_force_N);
         }
     }
 

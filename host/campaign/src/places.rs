@@ -7,7 +7,7 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 
 use crate::criteria::{
-    BOTTOM_DEADBANDS, BOTTOM_SHARE, BOTTOM_STROKE, FREE_FORCE, LARGEST_CONTRACTION, LEVELS, SLOW_STROKE,
+    BOTTOM_DEADBANDS, BOTTOM_SHARE, BOTTOM_STROKE, FORCE_SHARE, FREE_FORCE, LARGEST_CONTRACTION, LEVELS, SLOW_STROKE,
     TOP_SHARE,
 };
 use crate::rig::{Axis, Rig};
@@ -17,6 +17,8 @@ use crate::rig::{Axis, Rig};
 pub struct Places {
     /// Highest level, Pa.
     pub top: f64,
+    /// The largest force that is allowed, N, where it is what determines the highest level.
+    pub limited_by_force: Option<f64>,
     /// Largest stroke that is allowed, m.
     pub stroke_max: f64,
     /// Largest speed that is allowed, m/s.
@@ -39,6 +41,12 @@ pub struct Places {
     decided: Option<Vec<f64>>,
 }
 
+/// Force per pressure of the ideal braid at rest length, m². A real muscle pulls less: its bladder takes a part of the pressure.
+fn braid_area(muscle: &MuscleDescription) -> f64 {
+    let braid = muscle.geometry().build();
+    braid.map_or(0.0, |braid| braid.posture(Length::from_metres(0.0)).area)
+}
+
 impl Places {
     /// Before anything is recorded.
     ///
@@ -56,9 +64,12 @@ impl Places {
         }
         let stroke_max = (LARGEST_CONTRACTION * muscle.rest_length())
             .min(rig.stroke_max_mm.map_or(f64::INFINITY, |mm| mm * 1e-3));
+        let rated = TOP_SHARE * highest;
+        let bearable = rig.force_max.map_or(f64::INFINITY, |force| FORCE_SHARE * force / braid_area(muscle));
         Ok(Self {
             // Whole kilopascals, as an operator would set them.
-            top: (TOP_SHARE * highest * 1e-3).floor() * 1e3,
+            top: (rated.min(bearable) * 1e-3).floor() * 1e3,
+            limited_by_force: rig.force_max.filter(|_| bearable < rated),
             stroke_max,
             speed_max: rig.speed_max_mm_s.map_or(f64::INFINITY, |v| v * 1e-3),
             by_hand: rig.axis == Axis::Prompt,
@@ -69,6 +80,17 @@ impl Places {
             pulled_at: Vec::new(),
             slack_from: f64::INFINITY,
             decided: None,
+        })
+    }
+
+    /// Why the highest level is below what the pressures allow; `None` where it is not.
+    #[must_use]
+    pub fn limitation(&self) -> Option<String> {
+        self.limited_by_force.map(|force| {
+            format!(
+                "the highest level is {:.0} kPa: at more, the muscle could pull more than the {force:.0} N that the rig and the controller allow",
+                self.top * 1e-3
+            )
         })
     }
 
@@ -258,5 +280,22 @@ impl Places {
                 self.blocked * share.max(0.0)
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use virtual_bench::presets;
+
+    #[test]
+    fn a_weak_load_cell_limits_the_highest_level() {
+        let muscle = MuscleDescription::parse(&presets::miniature().description()).unwrap();
+        let free = Places::new(&muscle, &Rig::commanded()).unwrap();
+        assert_eq!(free.limitation(), None);
+        let weak = Places::new(&muscle, &Rig { force_max: Some(50.0), ..Rig::commanded() }).unwrap();
+        let pull = weak.top * braid_area(&muscle);
+        assert!(weak.top < free.top && (44.0..=45.0).contains(&pull), "{pull} N at {} Pa", weak.top);
+        assert!(weak.limitation().is_some_and(|l| l.contains("50 N")));
     }
 }

@@ -11,6 +11,11 @@ use super::setpoint_profile::{Quantity, SetpointProfile};
 use super::{Client, tables};
 use pam_data::error::Result;
 
+/// A setpoint above a limit by less than this factor is at the limit: numbers that users write are rounded.
+const ROUNDING: f32 = 1.001;
+/// Halvings of an interval: a rest length divided by 2^20 is below a micrometre.
+const BISECTIONS: usize = 20;
+
 /// How long a run was beyond what its table can do, or was tested for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Unreached {
@@ -60,32 +65,84 @@ impl Reachability {
         }))
     }
 
-    /// Why a profile exceeds the limits of the muscle, before it moves: a pressure above the highest allowed one, or a force above that
-    /// at rest length and this pressure, friction included. `None` where its largest value is within the limits.
+    /// Why the muscle cannot follow a profile, before it moves; `None` where the whole profile is within its limits.
     #[must_use]
     pub fn beyond(&self, quantity: Quantity, profile: &SetpointProfile) -> Option<String> {
-        let highest = profile.highest();
-        let most = self.table.max_pressure;
+        let (lowest, highest) = profile.range()?;
         match quantity {
-            Quantity::Pressure if highest > 1.001 * most.pascals() => Some(format!(
+            Quantity::Pressure => self.pressure_beyond(lowest, highest),
+            Quantity::Force => self.force_beyond(lowest, highest),
+            Quantity::Stroke => self.stroke_beyond(lowest, highest),
+            Quantity::Angle { .. } => None,
+        }
+    }
+
+    fn pressure_beyond(&self, lowest: f32, highest: f32) -> Option<String> {
+        let most = self.table.max_pressure;
+        if highest > ROUNDING * most.pascals() {
+            return Some(format!(
                 "the setpoint reaches {:.0} kPa, and the highest pressure of the table is {:.0} kPa: the controller limits the setpoint to it",
                 highest / 1e3,
                 most.kilopascals()
-            )),
-            Quantity::Force => {
-                let friction = self.table.friction.iter().copied().fold(0.0, f32::max);
-                let rest = self.muscle.at_stroke(Length::from_metres(0.0));
-                let largest = self.muscle.parts(&rest, most).quasi() * (1.0 + friction);
-                (highest > largest).then(|| {
-                    format!(
-                        "the setpoint reaches {highest:.0} N, and the muscle pulls at most {largest:.0} N, at rest length and {:.0} kPa: the \
-                         pressure would stay at its highest value",
-                        most.kilopascals()
-                    )
-                })
-            }
-            _ => None,
+            ));
         }
+        (lowest < 0.0).then(|| {
+            format!("the setpoint falls to {:.0} kPa: a regulator cannot go below ambient pressure, 0 kPa", lowest / 1e3)
+        })
+    }
+
+    /// Against the force at rest length and the highest pressure, friction included.
+    fn force_beyond(&self, lowest: f32, highest: f32) -> Option<String> {
+        let most = self.table.max_pressure;
+        let friction = self.table.friction.iter().copied().fold(0.0, f32::max);
+        let rest = self.muscle.at_stroke(Length::from_metres(0.0));
+        let largest = self.muscle.parts(&rest, most).quasi() * (1.0 + friction);
+        if highest > largest {
+            return Some(format!(
+                "the setpoint reaches {highest:.0} N, and the muscle pulls at most {largest:.0} N, at rest length and {:.0} kPa: the pressure \
+                 would stay at its highest value",
+                most.kilopascals()
+            ));
+        }
+        (lowest < 0.0).then(|| format!("the setpoint falls to {lowest:.0} N: a muscle cannot push"))
+    }
+
+    /// Against the stroke at which the muscle pulls nothing at the highest pressure.
+    fn stroke_beyond(&self, lowest: f32, highest: f32) -> Option<String> {
+        let longest = self.free_stroke();
+        if highest > ROUNDING * longest {
+            return Some(format!(
+                "the setpoint reaches {:.1} mm, and the muscle shortens by at most {:.1} mm, without load at {:.0} kPa: the pressure would \
+                 stay at its highest value",
+                highest * 1e3,
+                longest * 1e3,
+                self.table.max_pressure.kilopascals()
+            ));
+        }
+        (lowest < 0.0).then(|| {
+            format!(
+                "the setpoint falls to {:.1} mm: the muscle is at rest length at 0 mm, and only a load can make it longer",
+                lowest * 1e3
+            )
+        })
+    }
+
+    /// The stroke at which the force vanishes at the highest pressure, m.
+    fn free_stroke(&self) -> f32 {
+        let pulls = |stroke: f32| {
+            let held = self.muscle.at_stroke(Length::from_metres(stroke));
+            self.muscle.parts(&held, self.table.max_pressure).quasi() > 0.0
+        };
+        let (mut pulling, mut slack) = (0.0, self.table.geometry.rest_length.metres());
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (pulling + slack);
+            if pulls(middle) {
+                pulling = middle;
+            } else {
+                slack = middle;
+            }
+        }
+        pulling
     }
 
     /// Takes a sample of a run.
@@ -194,5 +251,23 @@ mod tests {
         assert!(reach.beyond(Quantity::Force, &sine).is_some());
         assert_eq!(reach.beyond(Quantity::Force, &constant(100.0)), None);
         assert_eq!(reach.beyond(Quantity::Pressure, &constant(600e3)), None);
+        let said = reach.beyond(Quantity::Pressure, &constant(-20e3)).expect("below");
+        assert!(said.contains("-20 kPa"), "{said}");
+        assert!(reach.beyond(Quantity::Force, &constant(-1.0)).is_some());
+    }
+
+    #[test]
+    fn a_stroke_longer_than_the_free_one_is_known_before_the_muscle_moves() {
+        let reach = of_example();
+        let constant = |metres| SetpointProfile::Constant(metres);
+        let free = reach.free_stroke();
+        let held = reach.muscle.at_stroke(Length::from_metres(free));
+        let force = reach.muscle.parts(&held, reach.table.max_pressure).quasi();
+        assert!(force.abs() < 0.1, "{force} N at the free stroke {free} m");
+        assert_eq!(reach.beyond(Quantity::Stroke, &constant(0.9 * free)), None);
+        let said = reach.beyond(Quantity::Stroke, &constant(1.2 * free)).expect("beyond");
+        assert!(said.contains("shortens by at most"), "{said}");
+        let said = reach.beyond(Quantity::Stroke, &constant(-0.005)).expect("longer");
+        assert!(said.contains("-5.0 mm"), "{said}");
     }
 }

@@ -161,19 +161,20 @@ impl<'a> Words<'a> {
 }
 
 impl SetpointProfile {
-    /// The largest setpoint, SI.
+    /// The smallest and the largest setpoint, SI; `None` where it comes later from elsewhere.
     #[must_use]
-    pub fn highest(&self) -> f32 {
-        let largest = |values: &[f32]| values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    pub fn range(&self) -> Option<(f32, f32)> {
         match self {
-            Self::Constant(value) => *value,
+            Self::Constant(value) => Some((*value, *value)),
             Self::Wave(
                 Reference::Sine { mean, amplitude, .. } | Reference::Chirp { mean, amplitude, .. },
-            ) => mean + amplitude.abs(),
-            Self::Wave(Reference::Trapezoid { low, high, .. }) => low.max(*high),
-            // What the device plays or is sent later is not known here.
-            Self::Wave(Reference::SetPoint | Reference::Table { .. }) => f32::NEG_INFINITY,
-            Self::Steps { values, .. } | Self::Points { values, .. } => largest(values),
+            ) => Some((mean - amplitude.abs(), mean + amplitude.abs())),
+            Self::Wave(Reference::Trapezoid { low, high, .. }) => Some((low.min(*high), low.max(*high))),
+            Self::Wave(Reference::SetPoint | Reference::Table { .. }) => None,
+            Self::Steps { values, .. } | Self::Points { values, .. } => {
+                let smallest = values.iter().copied().reduce(f32::min)?;
+                Some((smallest, values.iter().copied().reduce(f32::max)?))
+            }
         }
     }
 

@@ -252,4 +252,12 @@ impl Diagnosis {
             Outcome::NotJudged(_) => Verdict::Consistent,
         }
     }
+
+    /// Takes over the blocked force of the table that was fitted to the same campaign, N, so that a user meets one figure only.
+    /// Changes nothing where there was nothing to judge.
+    pub fn adopt_blocked_force(&mut self, fitted: f64) {
+        if self.judged() {
+            self.blocked_force_N = fitted;
+        }
+    }
 }

@@ -83,9 +83,8 @@ fn diagnose(result: &mut Analysis, item: &WorkItem, inputs: &Inputs, loaded: &Lo
     let asked = pam_diagnose::Options { muscle: item.muscle.clone(), ..Default::default() };
     match pam_diagnose::history::diagnose(&loaded.campaign, &geometry, &asked) {
         Ok(mut answer) => {
-            // One blocked force for one campaign.
-            if let (Some(fitted), true) = (&result.fit, answer.judged()) {
-                answer.blocked_force_N = fitted.summary.blocked_force_N;
+            if let Some(fitted) = &result.fit {
+                answer.adopt_blocked_force(fitted.summary.blocked_force_N);
             }
             if options.reports {
                 let page = diagnose_page::page(&answer, &geometry, &loaded.campaign);

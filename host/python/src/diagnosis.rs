@@ -58,9 +58,8 @@ pub(crate) fn diagnose(
     let options = diagnosis::Options { muscle: muscle.name.clone(), ..Default::default() };
     let mut answer =
         py.detach(|| diagnosis::history::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
-    // One blocked force for one campaign: that of `fit`.
     if let Ok(plain) = py.detach(|| pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default())) {
-        answer.blocked_force_N = plain.summary.blocked_force_N;
+        answer.adopt_blocked_force(plain.summary.blocked_force_N);
     }
     Ok(DiagnosisResult { answer, campaign, muscle })
 }

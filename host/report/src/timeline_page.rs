@@ -62,7 +62,7 @@ fn compared(visits: &[Visit], found: &Timeline) -> Section {
 fn quantities(visits: &[Visit], found: &Timeline, kind: Kind, title: &str) -> Section {
     let mut section = Section::new(title);
     let mut table =
-        Table::new("Values with 95 % intervals", &["quantity", "first campaign", "last campaign", "course"]);
+        Table::new("Values, with 95 % intervals where recordings are repeated", &["quantity", "first campaign", "last campaign", "course"]);
     for (index, (series, course)) in found.of_kind(kind).enumerate() {
         let id = format!("{}-{index}", name(&series.what));
         section.figure(Figure::new(
@@ -95,14 +95,19 @@ fn panel(visits: &[Visit], series: &Series, course: &Course) -> Panel {
     let x: Vec<f64> = known.iter().map(|i| at(*i)).collect();
     let points: Vec<_> = known.iter().filter_map(|i| series.points[*i]).collect();
     let value: Vec<f64> = points.iter().map(|p| scale * p.value).collect();
-    let half = |p: &pam_diagnose::timeline::series::Point| p.std.map_or(0.0, |s| HALF_95 * s * scale);
-    let low: Vec<f64> = points.iter().zip(&value).map(|(p, v)| v - half(p)).collect();
-    let high: Vec<f64> = points.iter().zip(&value).map(|(p, v)| v + half(p)).collect();
+    // A campaign without repeats has a value, and no interval.
+    let repeated: Vec<usize> = (0..points.len()).filter(|i| points[*i].std.is_some()).collect();
+    let end = |sign: f64| -> Vec<f64> {
+        repeated.iter().map(|i| value[*i] + sign * HALF_95 * scale * points[*i].std.unwrap_or(0.0)).collect()
+    };
+    let interval_x: Vec<f64> = repeated.iter().map(|i| x[*i]).collect();
     let axis =
         if spread { Axis::new("time since the first campaign", "d") } else { Axis::new("campaign", "") };
-    let mut panel = Panel::new(axis, Axis::new(name(&series.what), unit))
-        .intervals("95 % by repeats", Colour::Series(0), &x, &low, &high)
-        .points("value", Colour::Series(0), &x, &value);
+    let mut panel = Panel::new(axis, Axis::new(name(&series.what), unit));
+    if !repeated.is_empty() {
+        panel = panel.intervals("95 % by repeats", Colour::Series(0), &interval_x, &end(-1.0), &end(1.0));
+    }
+    panel = panel.points("value", Colour::Series(0), &x, &value);
     for c in &course.changes {
         panel = panel.region("change", at(c.from), at(c.to));
     }

@@ -146,7 +146,7 @@ fn clear_silence(client: &mut Client, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// No more pressure and stroke than the controller itself allows.
+/// No more pressure, stroke, and force than the controller itself allows.
 fn limit(rig: &mut Rig, client: &mut Client) -> Result<()> {
     let settings = client.call::<GetSettings>(&())?;
     // A twentieth below the fault: ripple and overshoot of the regulator.
@@ -155,6 +155,8 @@ fn limit(rig: &mut Rig, client: &mut Client) -> Result<()> {
     rig.pressure_max_kpa = Some(rig.pressure_max_kpa.map_or(kpa, |own| own.min(kpa)));
     let mm = f64::from(settings.limits.stroke_max_m) * 1e3;
     rig.stroke_max_mm = Some(rig.stroke_max_mm.map_or(mm, |own| own.min(mm)));
+    let newtons = f64::from(settings.limits.force_n);
+    rig.force_max = Some(rig.force_max.map_or(newtons, |own| own.min(newtons)));
     Ok(())
 }
 

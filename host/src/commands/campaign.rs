@@ -115,6 +115,9 @@ impl Arguments {
         let (purpose, purpose_name) = self.purpose.purpose();
         let mut engine =
             Engine::new(rigging.muscle.clone(), rigging.rig.clone(), purpose, 60.0 * self.minutes)?;
+        if let Some(limitation) = engine.places().limitation() {
+            console.note(limitation);
+        }
         let mut watching = Watching::new(console, interrupted, 60.0 * self.minutes, 0.0);
         let outcome = run(&mut engine, &mut rigging.controller, &mut journal, &mut watching);
         drop(watching);

@@ -30,11 +30,11 @@ const LISTED: usize = 6;
     host compare --import r.toml a.csv a.csv --where-a run=1 --where-b run=2"
 )]
 pub struct Arguments {
-    /// The first recording.
-    #[arg(value_name = "A.csv")]
+    /// The first recording; `-` is standard input.
+    #[arg(value_name = "A.csv", value_parser = recordings::recording)]
     a: PathBuf,
-    /// The second recording.
-    #[arg(value_name = "B.csv")]
+    /// The second recording; `-` is standard input.
+    #[arg(value_name = "B.csv", value_parser = recordings::recording)]
     b: PathBuf,
     /// The muscle's description, where files give lengths or contractions in place of a stroke.
     #[arg(long, value_name = "MUSCLE.toml")]

@@ -228,8 +228,7 @@ impl Arguments {
     }
 }
 
-/// The errors of the table without effects, and of the given table, on the recordings. One blocked force for one campaign: that of
-/// `host fit`.
+/// The errors of the table without effects, and of the given table, on the recordings.
 fn measure_errors(
     answer: &mut Diagnosis,
     campaign: &Campaign,
@@ -239,7 +238,7 @@ fn measure_errors(
     let plain = answer.judged().then(|| pam_fit::fit(campaign, muscle, &pam_fit::Options::default()).ok());
     let plain = plain.flatten();
     if let Some(plain) = &plain {
-        answer.blocked_force_N = plain.summary.blocked_force_N;
+        answer.adopt_blocked_force(plain.summary.blocked_force_N);
     }
     if let Some(rms) = table.map(|table| predict(table, campaign)).transpose()?.and_then(|p| p.rms) {
         answer.misfit_rms_N = rms;

@@ -112,6 +112,10 @@ impl Arguments {
         }
         if self.json.as_deref() != Some(Path::new("-")) {
             console.note(fitted.summary.to_string());
+            let written = self.output.as_ref().filter(|_| self.writes(&fitted.summary));
+            if let Some(path) = written.filter(|path| *path != Path::new("-")) {
+                console.note(format!("wrote {}", path.display()));
+            }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
         self.judge(&fitted.summary.faults, console)
@@ -143,13 +147,18 @@ impl Arguments {
     /// Writes the table, unless it is useless for control and not forced, and the figures.
     fn write(&self, table: &TableFile, summary: &Summary) -> Result<()> {
         let json = text(summary)?;
-        if let Some(path) = self.output.as_ref().filter(|_| summary.faults.is_empty() || self.force) {
+        if let Some(path) = self.output.as_ref().filter(|_| self.writes(summary)) {
             table.write(path)?;
         }
         match &self.json {
             Some(path) => write_whole(path, format!("{json}\n").as_bytes()),
             None => Ok(()),
         }
+    }
+
+    /// Whether a table with these faults is written.
+    fn writes(&self, summary: &Summary) -> bool {
+        summary.faults.is_empty() || self.force
     }
 
     /// A table with faults is an error, or a warning with `--force`.

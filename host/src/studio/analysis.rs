@@ -297,11 +297,10 @@ impl Analysis {
         let geometry = muscle.geometry();
         let options = pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
         let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
-        // One blocked force for one campaign.
         if answer.judged()
             && let Ok(plain) = pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default())
         {
-            answer.blocked_force_N = plain.summary.blocked_force_N;
+            answer.adopt_blocked_force(plain.summary.blocked_force_N);
         }
         let html = in_page(diagnose_page::page(&answer, &geometry, &campaign).html());
         let report = Self::keep_report(&mut self.known(), report_name()?, html);

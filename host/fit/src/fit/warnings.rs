@@ -12,8 +12,12 @@ const NO_MUSCLE: f64 = 10.0;
 
 /// A force whose range below zero is this many times that above has the wrong sign.
 const WRONG_SIGN: f64 = 3.0;
-/// One standard atmosphere, Pa: an absolute pressure sensor never reads much less.
-const ATMOSPHERE: f64 = 101_325.0;
+/// Atmospheric pressure at 2,400 m above the sea, Pa: an absolute pressure sensor reads no less in most laboratories, and the deadband
+/// of its table is higher by as much.
+const THIN_AIR: f64 = 75e3;
+/// A reading this much above the force at rest length and the highest tested pressure contradicts the table there: friction and errors of
+/// the mounted length are smaller.
+const ABOVE_BLOCKED: f64 = 0.1;
 
 /// All warnings. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the others; both
 /// in percent of blocked force.
@@ -22,6 +26,7 @@ pub(super) fn warnings(solution: &Solution, mean_error: f64, left_out: &[Option<
     let mut out = solution.warnings.clone();
     agreement(solution, mean_error, &mut out);
     amount(solution, &mut out);
+    blocked_force(solution, &mut out);
     lengths(solution, &mut out);
     friction(solution, &mut out);
     deadband(solution, &mut out);
@@ -127,6 +132,20 @@ fn lengths(solution: &Solution, out: &mut Vec<String>) {
     }
 }
 
+/// Whether the force at rest length is at least what was measured at shorter lengths.
+fn blocked_force(solution: &Solution, out: &mut Vec<String>) {
+    let points = &solution.problem.points;
+    let Some(highest) = solution.problem.pressures.levels.last().copied() else { return };
+    let (blocked, largest) = (solution.blocked(highest), points.force.high);
+    if points.stroke.low > 0.0 && largest > (1.0 + ABOVE_BLOCKED) * blocked {
+        out.push(format!(
+            "the table pulls {blocked:.0} N at rest length and {:.0} kPa, but {largest:.0} N was measured on the shortened muscle: do not use \
+             the table outside the recorded lengths; record the force at rest length too",
+            highest / 1e3
+        ));
+    }
+}
+
 /// Whether friction is identifiable and has a possible sign.
 fn friction(solution: &Solution, out: &mut Vec<String>) {
     let (design, points) = (&solution.problem.design, &solution.problem.points);
@@ -181,7 +200,7 @@ fn deadband(solution: &Solution, out: &mut Vec<String>) {
              force",
             p0 / 1e3
         ));
-    } else if p0 > ATMOSPHERE && points.pressure.low > 0.9 * ATMOSPHERE {
+    } else if p0 > THIN_AIR && points.pressure.low > THIN_AIR {
         out.push(format!(
             "the deadband P0 is {:.0} kPa and the lowest pressure is {:.0} kPa: if the sensor reads absolute pressure, subtract one atmosphere \
              (101.3 kPa) with an offset in an import description",

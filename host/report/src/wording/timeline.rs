@@ -224,7 +224,12 @@ pub fn summary(visits: &[Visit], found: &Timeline) -> String {
     for [date, name, _, verdict] in &rows {
         let _ = writeln!(text, "  {date}  {name:width$}  {verdict}");
     }
-    text.push_str("\nQuantities (95 % intervals by repeats within a campaign):\n");
+    let repeated = found.series.iter().any(|(s, _)| s.points.iter().flatten().any(|p| p.std.is_some()));
+    text.push_str(if repeated {
+        "\nQuantities (95 % intervals by repeats within a campaign):\n"
+    } else {
+        "\nQuantities (without intervals, as no campaign repeats a recording):\n"
+    });
     for (series, course) in &found.series {
         let ends: Vec<String> = [series.points.first(), series.points.last()]
             .into_iter()
