@@ -7,8 +7,8 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 
 use crate::criteria::{
-    BOTTOM_DEADBANDS, BOTTOM_SHARE, BOTTOM_STROKE, FORCE_SHARE, FREE_FORCE, LARGEST_CONTRACTION, LEVELS, SLOW_STROKE,
-    TOP_SHARE,
+    BOTTOM_DEADBANDS, BOTTOM_SHARE, BOTTOM_STROKE, FORCE_SHARE, FREE_FORCE, LARGEST_CONTRACTION, LEVELS,
+    SLOW_STROKE, TOP_SHARE,
 };
 use crate::rig::{Axis, Rig};
 

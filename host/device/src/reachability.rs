@@ -87,7 +87,10 @@ impl Reachability {
             ));
         }
         (lowest < 0.0).then(|| {
-            format!("the setpoint falls to {:.0} kPa: a regulator cannot go below ambient pressure, 0 kPa", lowest / 1e3)
+            format!(
+                "the setpoint falls to {:.0} kPa: a regulator cannot go below ambient pressure, 0 kPa",
+                lowest / 1e3
+            )
         })
     }
 

@@ -9,8 +9,8 @@ use super::candidates::{Candidate, library};
 use super::confirmation::select_and_confirm;
 use super::criteria::baseline::{TABLE_ORDER, WALL};
 use super::criteria::judgement::{
-    EXPLAINED, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE, LINE_UNEXPLAINED,
-    PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
+    EXPLAINED, EXPLAINED_REST, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE,
+    LINE_UNEXPLAINED, PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
 };
 use super::criteria::rows::{NO_LOAD, SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
@@ -313,7 +313,8 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
 fn removes_on_unseen(held_out: &HeldOut, admitted: f64) -> bool {
     let excess = |rms: f64| (rms.powi(2) - held_out.noise_N.powi(2)).max(0.0);
     let (before, after) = (excess(held_out.rms_before_N), excess(held_out.rms_after_N));
-    after <= admitted.powi(2) || after <= (1.0 - EXPLAINED_UNSEEN) * before
+    let near_noise = held_out.rms_after_N <= EXPLAINED_REST * held_out.noise_N;
+    after <= admitted.powi(2) || near_noise && after <= (1.0 - EXPLAINED_UNSEEN) * before
 }
 
 /// Forces that the answer states.

@@ -13,6 +13,7 @@ use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
+use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 use pam_fit::RecordingResidual;
 use pam_fit::bench::Candidate;
@@ -76,9 +77,14 @@ fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { figures(100.0 * part / whole, 2) } else { "–".into() }
 }
 
+/// Whether tables that differ between pressures hide an error of the model.
+fn one_bladder_misfits(d: &Diagnosis) -> bool {
+    d.remarks.iter().any(|r| matches!(r, Remark::Concealed { .. }))
+}
+
 fn header(page: &mut Page, d: &Diagnosis) {
     let tone = match d.verdict() {
-        Verdict::Consistent if d.judged() => Tone::Good,
+        Verdict::Consistent if d.judged() && !one_bladder_misfits(d) => Tone::Good,
         Verdict::Unexplained => Tone::Bad,
         Verdict::Consistent | Verdict::Explained | Verdict::PartlyExplained => Tone::Caution,
     };
@@ -94,24 +100,36 @@ fn header(page: &mut Page, d: &Diagnosis) {
             percent(d.misfit_rms_N, d.blocked_force_N),
             figures(d.noise_N, 2)
         ),
-        if d.verdict() == Verdict::Consistent { Tone::Good } else { Tone::Caution },
+        if d.verdict() == Verdict::Consistent && !one_bladder_misfits(d) {
+            Tone::Good
+        } else {
+            Tone::Caution
+        },
     );
     if !d.missing.is_empty() {
         let h = &d.held_out;
-        let better = h.rms_after_N < h.rms_before_N;
+        let tone = match d.verdict() {
+            _ if h.rms_after_N >= h.rms_before_N => Tone::Bad,
+            Verdict::Explained => Tone::Good,
+            _ => Tone::Caution,
+        };
         page.fact(
             "error on held-out rows",
             format!("{} → {} N", figures(h.rms_before_N, 2), figures(h.rms_after_N, 2)),
             "rms, without and with the effects",
-            if better { Tone::Good } else { Tone::Bad },
+            tone,
         );
     }
     if d.verdict() != Verdict::Consistent {
         page.fact(
             "unexplained",
             format!("{} %", fixed(100.0 * d.unexplained.share, 0)),
-            "of the squared error above the noise",
-            if d.unexplained.share < 0.2 { Tone::Good } else { Tone::Caution },
+            wording::unexplained_base(d),
+            if d.unexplained.share < 0.2 && d.verdict() == Verdict::Explained {
+                Tone::Good
+            } else {
+                Tone::Caution
+            },
         );
     }
 }
@@ -125,6 +143,12 @@ fn recommendation(d: &Diagnosis) -> Section {
     let mut steps = Vec::new();
     if !d.judged() {
         steps.push("Correct what the remarks name, and record again.".to_owned());
+    } else if d.missing.is_empty() && d.verdict() == Verdict::Consistent && one_bladder_misfits(d) {
+        steps.push(
+            "Use the table of `host fit` at the tested pressures only, with the error that it states: one bladder does not describe all \
+             pressures. The remarks name what could be the cause."
+                .to_owned(),
+        );
     } else if d.missing.is_empty() && d.verdict() == Verdict::Consistent {
         steps.push(
             "Use the table of `host fit`: it describes these recordings within their noise.".to_owned(),

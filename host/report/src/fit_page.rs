@@ -113,7 +113,7 @@ fn header(page: &mut Page, view: &View<'_>) {
     page.fact(
         "blocked force",
         format!("{} N", figures(s.blocked_force_N, 4)),
-        view.levels.last().map_or(String::new(), |p| format!("at {} kPa", fixed(p / 1e3, 0))),
+        format!("at {} kPa", fixed(view.highest_pressure() / 1e3, 0)),
         Tone::Plain,
     );
 }

@@ -61,8 +61,10 @@ fn compared(visits: &[Visit], found: &Timeline) -> Section {
 
 fn quantities(visits: &[Visit], found: &Timeline, kind: Kind, title: &str) -> Section {
     let mut section = Section::new(title);
-    let mut table =
-        Table::new("Values, with 95 % intervals where recordings are repeated", &["quantity", "first campaign", "last campaign", "course"]);
+    let mut table = Table::new(
+        "Values, with 95 % intervals where recordings are repeated",
+        &["quantity", "first campaign", "last campaign", "course"],
+    );
     for (index, (series, course)) in found.of_kind(kind).enumerate() {
         let id = format!("{}-{index}", name(&series.what));
         section.figure(Figure::new(

@@ -65,6 +65,10 @@ pub(crate) fn emulated(
         }
     };
     let mut rig = rig.unwrap_or_else(|| Rig { checks: true, ..Rig::commanded() });
+    if let Some(axis) = not_emulated(rig.axis) {
+        return Err(Error::new(DataCode::CallInvalid, format!("the virtual bench has no {axis}"))
+            .help("with --emulate, write axis = \"commanded\" or \"held\" in rig.toml"));
+    }
     let axis = Axis::default();
     let emulated = Emulated::start(Stand::commanded(bench.clone(), axis.clone()), only, speed)?;
     let mut client = Client::open(emulated.address())?;
@@ -77,6 +81,15 @@ pub(crate) fn emulated(
     let words = emulated.words();
     let controller = Controller::new(client, Box::new(axis.clone()), made);
     Ok(Rigging { controller, rig, muscle, words, emulated: Some((emulated, axis)) })
+}
+
+/// What the virtual bench does not have of a rig with this axis.
+fn not_emulated(axis: RigAxis) -> Option<&'static str> {
+    match axis {
+        RigAxis::Weight => Some("hanging weight"),
+        RigAxis::Pair => Some("second muscle"),
+        _ => None,
+    }
 }
 
 /// Allows an emulated host to be silent as long as a real one: the watch counts device time, which goes so much faster, and twice as fast

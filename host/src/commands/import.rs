@@ -99,15 +99,28 @@ impl Arguments {
             return Err(error);
         }
         if let Some(path) = self.output.as_deref().filter(|p| p.as_os_str() != "-") {
+            let muscle = self.muscle.as_deref().unwrap_or(Path::new("MUSCLE.toml"));
+            let piped = first != named;
             console.note(format!(
-                "written to {}; next: host fit --muscle MUSCLE.toml --import {} {}",
+                "written to {}; next: host fit --muscle {} --import {} {}",
                 path.display(),
+                muscle.display(),
                 path.display(),
-                if first == named { named.display().to_string() } else { "-".to_owned() }
+                if piped { "-".to_owned() } else { listed(&self.guess) }
             ));
         }
         Ok(())
     }
+}
+
+/// The files for a command line; of many, the first and how many more.
+fn listed(files: &[PathBuf]) -> String {
+    let shown = if files.len() > LISTED { 1 } else { files.len() };
+    let mut names: Vec<String> = files.iter().take(shown).map(|f| f.display().to_string()).collect();
+    if files.len() > shown {
+        names.push(format!("… (all {} files)", files.len()));
+    }
+    names.join(" ")
 }
 
 /// The file itself, or what a pipe gave, as a file in `folder`.

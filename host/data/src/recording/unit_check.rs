@@ -43,7 +43,7 @@ const LEAST_ROWS: usize = 8;
 const LEAST_RECORDINGS: usize = 3;
 /// From this residual on, as a share of the usual largest force, the search without one recording starts: a wrong recording also bends
 /// the surface that includes it.
-const SEARCH_FROM: f64 = 0.06;
+const SEARCH_FROM: f64 = 0.02;
 /// At most this many recordings are excluded until the others agree, each chosen among this many with the largest residuals.
 const MOST_ODD: usize = 6;
 const TRIED: usize = 24;
@@ -69,13 +69,14 @@ pub(crate) fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRe
         campaign.recordings.iter().enumerate().filter(|(_, r)| long_enough(r)).map(of).collect();
     let Some(largest) = usual_largest(&samples) else { return Vec::new() };
     let Some((others, odd)) = consensus(&samples, largest) else { return Vec::new() };
-    odd.into_iter().filter_map(|i| others.judge(&samples[i])).collect()
+    odd.into_iter().filter_map(|i| others.judge(&samples[i])).map(|judged| judged.found).collect()
 }
 
 /// The surface on which most recordings agree, and those that do not, in order; `None` where all agree.
 ///
-/// A recording in a wrong unit bends the common surface and can make another one look inconsistent. So the recording is excluded
-/// without which the others agree best, then the next, until they agree.
+/// A recording in a wrong unit bends the common surface and can make another one look inconsistent. So the recording is excluded that
+/// agrees with the others once a mistake is corrected, if all agree better then. Where there is none, it is the one without which the
+/// others agree best. Then the next, until they agree.
 fn consensus(samples: &[Sample], largest: f64) -> Option<(ConsensusSurface, Vec<usize>)> {
     let mut kept: Vec<usize> = (0..samples.len()).collect();
     let mut odd = Vec::new();
@@ -95,19 +96,49 @@ fn consensus(samples: &[Sample], largest: f64) -> Option<(ConsensusSurface, Vec<
         let mut tried: Vec<usize> = kept.clone();
         tried.sort_by(|a, b| error_of(&consensus, *b).total_cmp(&error_of(&consensus, *a)));
         tried.truncate(TRIED);
-        let disagreement = |i: usize| {
+        let exclusion = |i: usize| {
             let rest = without(&kept, Some(i))?;
-            let sum: f64 = kept.iter().filter(|k| **k != i).map(|k| error_of(&rest, *k)).sum();
-            Some((sum, i, rest))
+            let disagreement: f64 = kept.iter().filter(|k| **k != i).map(|k| error_of(&rest, *k)).sum();
+            let corrected = rest.judge(&samples[i]).map(|judged| disagreement + judged.left);
+            Some(Exclusion { recording: i, rest, disagreement, corrected })
         };
-        let best = tried.into_iter().filter_map(disagreement).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, i, rest)) = best else { break };
-        kept.retain(|k| *k != i);
-        odd.push(i);
-        consensus = rest;
+        let with_all: f64 = kept.iter().map(|i| error_of(&consensus, *i)).sum();
+        let Some(best) =
+            Exclusion::best(tried.into_iter().filter_map(exclusion).collect(), kept.len(), with_all)
+        else {
+            break;
+        };
+        kept.retain(|k| *k != best.recording);
+        odd.push(best.recording);
+        consensus = best.rest;
     }
     odd.sort_unstable();
     (!odd.is_empty()).then_some((consensus, odd))
+}
+
+/// What the other recordings are without one of them.
+struct Exclusion {
+    recording: usize,
+    /// The surface of the others.
+    rest: ConsensusSurface,
+    /// Sum of the residuals of the others.
+    disagreement: f64,
+    /// The same with the residual of this one, corrected by one mistake; `None` where none explains it.
+    corrected: Option<f64>,
+}
+
+impl Exclusion {
+    /// The best one of `count` recordings, which together have this sum of residuals.
+    fn best(mut all: Vec<Self>, count: usize, with_all: f64) -> Option<Self> {
+        all.sort_by(|a, b| a.disagreement.total_cmp(&b.disagreement));
+        // A mistake that leaves the others in disagreement explains nothing: another recording is wrong.
+        let agreed = all.first()?.disagreement / (count - 1) as f64;
+        let allowed = with_all.min(count as f64 * agreed);
+        let explained = |e: &Self| e.corrected.filter(|sum| *sum < allowed);
+        let best =
+            (0..all.len()).filter_map(|i| Some((explained(&all[i])?, i))).min_by(|a, b| a.0.total_cmp(&b.0));
+        Some(all.swap_remove(best.map_or(0, |(_, i)| i)))
+    }
 }
 
 /// Rows of a recording, evenly spread.

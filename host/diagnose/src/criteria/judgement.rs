@@ -24,6 +24,8 @@ pam_data::criteria! {
     PARTLY_EXPLAINED: f64 = 0.25, "q_part", "1", Convention("a quarter");
     /// ... and only if the effects remove this share of the excess error on held-out rows, too.
     EXPLAINED_UNSEEN: f64 = 0.5, "q_unseen", "1", Convention("half: more remains than is explained below it");
+    /// ... and leave no more than this multiple of the noise there.
+    EXPLAINED_REST: f64 = 2.0, "s_unseen/s", "1", Convention("twice the noise: the rest is no larger than what noise and model leave elsewhere");
     /// p from which a line of the spectrum is real.
     LINE_ALPHA: f64 = 0.02, "p_line", "1", Convention("2 %, the second smallest p of 99 shuffles");
     /// ... that holds this share of the residual's energy.

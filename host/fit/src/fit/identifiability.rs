@@ -26,7 +26,7 @@ impl Correlations {
     pub fn at(solution: &Solution, root: &CovarianceRoot, pressure: f64) -> Self {
         let root = table_root(solution, root, &[pressure]);
         let order = solution.problem.design.layout().order;
-        let mut names = vec!["P0".to_owned()];
+        let mut names = vec![DEADBAND.to_owned()];
         names.extend((1..=order).map(|k| format!("E_{k}")));
         if solution.problem.design.friction {
             names.push("k_F".to_owned());
@@ -45,11 +45,11 @@ impl Correlations {
     }
 }
 
-/// A parameter that is not identifiable: its 95 % confidence interval contains zero.
+/// A parameter that is not identifiable: its 95 % confidence interval contains zero, or another parameter takes its place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)]
 pub struct NotDetermined {
-    /// The name of the parameter: `E_3`, `k_F`, …
+    /// The name of the parameter: `P0`, `E_3`, `k_F`, …
     pub parameter: String,
     /// The pressures at which it is not identifiable, kPa.
     pub pressures_kPa: Vec<f64>,
@@ -75,7 +75,29 @@ impl fmt::Display for NotDetermined {
 /// Of two parameters correlated beyond this, less than a fifth of the variance is their own (1 − 0.9² = 0.19).
 const CORRELATED: f64 = 0.9;
 
-/// Every `E_k` and `k_F` whose 95 % interval contains zero, with the reason.
+/// The deadband, where one pressure or one length was recorded: a stress of the bladder in place of it gives the same force there, and
+/// its interval would hold for the form of the elasticity alone.
+fn deadband(solution: &Solution) -> Option<NotDetermined> {
+    let levels = &solution.problem.pressures.levels;
+    let (one, more) = if levels.len() == 1 {
+        ("pressure", "more pressures")
+    } else if solution.problem.design.orthonormal.rank <= 1 {
+        ("length", "slow strokes or more lengths")
+    } else {
+        return None;
+    };
+    Some(NotDetermined {
+        parameter: DEADBAND.to_owned(),
+        pressures_kPa: levels.iter().map(|p| p / 1e3).collect(),
+        everywhere: true,
+        reason: format!("with one {one} it cannot be separated from the elasticity; record {more}"),
+    })
+}
+
+/// The name of the deadband pressure among the parameters.
+pub(crate) const DEADBAND: &str = "P0";
+
+/// `P0` without a second pressure or length, and every `E_k` and `k_F` whose 95 % interval contains zero, with the reason.
 #[must_use]
 pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<NotDetermined> {
     let levels = &solution.problem.pressures.levels;
@@ -95,7 +117,7 @@ pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<
     let more = if held { "more lengths" } else { "a longer stroke" };
     let contraction = 100.0 * solution.problem.points.stroke.span() / solution.problem.braid.rest_length();
     let kinds = order + usize::from(solution.problem.design.friction);
-    let mut all = Vec::new();
+    let mut all: Vec<NotDetermined> = deadband(solution).into_iter().collect();
     for k in 0..kinds {
         let loose: Vec<usize> = (0..levels.len())
             .filter(|i| !(values[*i][k].abs() > 1.96 * table.std(1 + k * levels.len() + i)))

@@ -1,8 +1,10 @@
 //! Where the curves over pressure get their nodes: at the tested levels, or spread over a continuous range.
 
+use std::collections::HashMap;
+
 use model_core::spline::MAX_NODES;
 
-use super::points::{Points, Range};
+use super::points::{Point, Points, Range};
 
 /// The pressures of a campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,9 +64,10 @@ fn held_levels(points: &Points) -> Option<Vec<f64>> {
         let rows = points.rows.max(1) as f64;
         return Some(vec![points.list.iter().map(|p| f64::from(p.rows) * p.pressure).sum::<f64>() / rows]);
     }
+    let weight = row_weights(points);
     let mut rows = vec![0.0; BINS];
     for p in &points.list {
-        rows[bin(range, p.pressure)] += f64::from(p.rows);
+        rows[bin(range, p.pressure)] += weight(p);
     }
     HALF_WIDTHS.into_iter().find_map(|share| {
         let half = (BINS as f64 * share) as usize;
@@ -75,7 +78,7 @@ fn held_levels(points: &Points) -> Option<Vec<f64>> {
             // Twice as far as a level is wide, so that its mean is not that of the densest part alone.
             let nearest = (0..peaks.len()).min_by_key(|i| peaks[*i].abs_diff(b));
             if let Some(i) = nearest.filter(|i| peaks[*i].abs_diff(b) <= 2 * half) {
-                let n = f64::from(p.rows);
+                let n = weight(p);
                 sums[i] = (sums[i].0 + n * p.pressure, sums[i].1 + n);
             }
         }
@@ -83,6 +86,30 @@ fn held_levels(points: &Points) -> Option<Vec<f64>> {
         levels.sort_by(f64::total_cmp);
         Some(levels)
     })
+}
+
+/// Recordings whose sampling rates differ by less than this factor count row by row.
+const RATES: f64 = 2.0;
+
+/// How many rows a point counts for. Where one recording was sampled much faster than another, time decides instead of rows: else the
+/// pressures of the slow one would vanish beside its rows.
+fn row_weights(points: &Points) -> impl Fn(&Point) -> f64 {
+    let mut spans: HashMap<u32, (f64, f64, f64)> = HashMap::new();
+    for p in &points.list {
+        let (first, last, rows) = spans.entry(p.recording).or_insert((p.time, p.time, 0.0));
+        (*first, *last, *rows) = (first.min(p.time), last.max(p.time), *rows + f64::from(p.rows));
+    }
+    let intervals: HashMap<u32, f64> =
+        spans.into_iter().map(|(r, (first, last, rows))| (r, (last - first) / rows)).collect();
+    let mut sorted: Vec<f64> = intervals.values().copied().filter(|i| *i > 0.0).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let (least, most) = (sorted.first().copied().unwrap_or(1.0), sorted.last().copied().unwrap_or(1.0));
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+    let differ = most > RATES * least;
+    move |p| {
+        let interval = intervals.get(&p.recording).copied().filter(|i| differ && *i > 0.0);
+        f64::from(p.rows) * interval.map_or(1.0, |i| i / usual)
+    }
 }
 
 fn bin(range: Range, pressure: f64) -> usize {

@@ -12,7 +12,7 @@ use pam_data::recording::{Campaign, largest_force_of};
 use super::by_recording::{self, RecordingResidual, recording_table};
 use super::dimensions::Adjusted;
 use super::errors::{ChunkError, errors};
-use super::identifiability::{Correlations, NotDetermined, not_determined};
+use super::identifiability::{Correlations, DEADBAND, NotDetermined, not_determined};
 use super::screen::{Outlier, PointUse};
 use super::solution::Solution;
 use super::uncertainty::{Uncertain, table_root};
@@ -187,9 +187,15 @@ impl std::fmt::Display for Summary {
         // An interval of zero width would claim certainty.
         let half = 1.96 * self.deadband_std_kPa;
         let places = (1..4).find(|p| half >= 0.5 * 10.0_f64.powi(-p)).unwrap_or(4) as usize;
+        let determined = self.not_determined.iter().all(|n| n.parameter != DEADBAND);
+        let (interval, meaning) = if determined {
+            (format!(" ± {half:.places$}"), " (±: 95 % confidence interval)")
+        } else {
+            (String::new(), "")
+        };
         writeln!(
             f,
-            "{}: {} rows, P0 {:.places$} ± {half:.places$} kPa, blocked force {:.1} N, rms {:.3} N (±: 95 % confidence interval)",
+            "{}: {} rows, P0 {:.places$}{interval} kPa, blocked force {:.1} N, rms {:.3} N{meaning}",
             self.muscle, self.samples, self.deadband_kPa, self.blocked_force_N, self.rms_N
         )?;
         write!(

@@ -19,8 +19,10 @@ use super::problem::Problem;
 use super::screen::Screen;
 use super::solution::Solution;
 use super::weights::scatter;
+use crate::confidence_band::HALF_95;
 use crate::numerics::covariance_root::CovarianceRoot;
 use crate::numerics::jackknife::covariance_root;
+use crate::numerics::student::half_width_95;
 use crate::numerics::symmetric::Symmetric;
 
 /// The uncertainty of the parameters.
@@ -106,7 +108,14 @@ fn leave_out(
         without.add_scaled(&part.matrix, -1.0);
         columns.push(without.factor().solve(&part.right));
     }
-    covariance_root(&columns, design.layout().len())
+    let mut root = covariance_root(&columns, design.layout().len());
+    root.scale(few_blocks(columns.len()));
+    root
+}
+
+/// Factor on the standard deviations by which 1.96 of them are the 95 % interval of Student's t, of a jackknife over so few blocks.
+fn few_blocks(blocks: usize) -> f64 {
+    half_width_95(blocks.saturating_sub(1).max(1)) / HALF_95
 }
 
 /// The residuals in standard deviations of their group (NaN where a point does not take part), correlated within half-strokes only.

@@ -12,9 +12,10 @@ const NO_MUSCLE: f64 = 10.0;
 
 /// A force whose range below zero is this many times that above has the wrong sign.
 const WRONG_SIGN: f64 = 3.0;
-/// Atmospheric pressure at 2,400 m above the sea, Pa: an absolute pressure sensor reads no less in most laboratories, and the deadband
-/// of its table is higher by as much.
-const THIN_AIR: f64 = 75e3;
+/// One standard atmosphere, Pa: an absolute pressure sensor never reads much less, and the deadband of its table is higher by as much.
+const ATMOSPHERE: f64 = 101_325.0;
+/// What a vented muscle reads on an absolute sensor, Pa: atmospheric pressure from 2,400 m above the sea to a high at sea level.
+const VENTED: std::ops::RangeInclusive<f64> = 75e3..=107e3;
 /// A reading this much above the force at rest length and the highest tested pressure contradicts the table there: friction and errors of
 /// the mounted length are smaller.
 const ABOVE_BLOCKED: f64 = 0.1;
@@ -46,7 +47,8 @@ fn rows(solution: &Solution, wanted: PointUse) -> usize {
 /// Whether sign, units and dimensions can be right.
 fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
     let force = &solution.problem.points.force;
-    if -force.low > WRONG_SIGN * force.high {
+    // A code for missing readings, such as −999, is no force.
+    if solution.problem.clips.0.is_none() && -force.low > WRONG_SIGN * force.high {
         out.push(format!(
             "the force ranges from {:.1} N to {:.1} N: force is positive as the muscle pulls; invert its sign with scale = -1 in an \
              import description",
@@ -135,7 +137,7 @@ fn lengths(solution: &Solution, out: &mut Vec<String>) {
 /// Whether the force at rest length is at least what was measured at shorter lengths.
 fn blocked_force(solution: &Solution, out: &mut Vec<String>) {
     let points = &solution.problem.points;
-    let Some(highest) = solution.problem.pressures.levels.last().copied() else { return };
+    let highest = points.pressure.high;
     let (blocked, largest) = (solution.blocked(highest), points.force.high);
     if points.stroke.low > 0.0 && largest > (1.0 + ABOVE_BLOCKED) * blocked {
         out.push(format!(
@@ -200,7 +202,9 @@ fn deadband(solution: &Solution, out: &mut Vec<String>) {
              force",
             p0 / 1e3
         ));
-    } else if p0 > THIN_AIR && points.pressure.low > THIN_AIR {
+    } else if p0 > ATMOSPHERE && points.pressure.low > 0.9 * ATMOSPHERE
+        || p0 > *VENTED.start() && VENTED.contains(&points.pressure.low)
+    {
         out.push(format!(
             "the deadband P0 is {:.0} kPa and the lowest pressure is {:.0} kPa: if the sensor reads absolute pressure, subtract one atmosphere \
              (101.3 kPa) with an offset in an import description",

@@ -54,6 +54,11 @@ impl CovarianceRoot {
         (size > 0.0).then(|| if i == j { 1.0 } else { dot(row(i), row(j)) / size })
     }
 
+    /// Multiplies all standard deviations.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.s.iter_mut().for_each(|s| *s *= factor);
+    }
+
     /// Adds one more column: an independent source of uncertainty.
     pub(crate) fn append(&mut self, column: &[f64]) {
         let mut s = Vec::with_capacity(self.rows * (self.columns + 1));

@@ -1,6 +1,7 @@
 //! Where the model is wrong: along each coordinate, and over time.
 
 use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures, residual_table, wording};
+use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Profile};
 use pam_fit::RecordingResidual;
 use pam_fit::numerics::median;
@@ -46,13 +47,18 @@ fn along(d: &Diagnosis, p: &Profile) -> Panel {
         .titled(name)
         .line("rms", Colour::Series(1), &x, &p.rms_before)
         .dashes("mean", Colour::Series(0), &x, &p.mean_before);
-    if !d.missing.is_empty() {
+    if effects_beyond_history(d) {
         panel = panel.line("rms, with the named effects", Colour::Series(2), &x, &p.rms_after);
     }
     if let Some((from, to)) = region {
         panel = panel.region("concentrated here", from, to);
     }
     panel.with("noise", Colour::Muted, Mark::Level(d.noise_N))
+}
+
+/// Whether effects are named beside the memory: that one is taken out of the recordings before anything is drawn.
+fn effects_beyond_history(d: &Diagnosis) -> bool {
+    d.missing.iter().any(|m| !is_from_history(m))
 }
 
 /// The chapter: a summary, along each coordinate, over time.
@@ -93,7 +99,7 @@ pub(super) fn section(d: &Diagnosis, residuals: &[RecordingResidual]) -> Section
     if t.time.len() > 1 {
         let [time, before, after, effects] = with_pauses(&t.time, [&t.time, &t.before, &t.after, &t.effects]);
         let mut panel = Panel::new(Axis::new("time", "s"), Axis::new("residual", "N"));
-        let found = !d.missing.is_empty();
+        let found = effects_beyond_history(d);
         if found {
             // Beneath, for it may be larger than what it explains.
             panel = panel.hair("force of the named effects", Colour::Muted, &time, &effects);

@@ -260,7 +260,8 @@ fn deadband(view: &View<'_>) -> Figure {
         repeats(view).iter().filter_map(|r| Some((view.levels[r.group] / 1e3, r.blocked?))).unzip()
     };
     let line: Vec<f64> = [p0, top].iter().map(|p| 1e3 * (p - p0) * area).collect();
-    let ends = [p0 - half, top];
+    // The band begins where its upper edge leaves zero, and its lower edge later.
+    let ends = [p0 - half, (p0 + half).min(top), top];
     let low: Vec<f64> = ends.iter().map(|p| (1e3 * (p - p0 - half) * area).max(0.0)).collect();
     let high: Vec<f64> = ends.iter().map(|p| (1e3 * (p - p0 + half) * area).max(0.0)).collect();
     let panel = Panel::new(
@@ -269,8 +270,8 @@ fn deadband(view: &View<'_>) -> Figure {
     )
     .band("95 % confidence interval", Colour::Series(0), &ends, &low, &high)
     .line("(P − P_{0}) g(L_{0})", Colour::Series(0), &[p0, top], &line)
-    .with(format!("P_{{0}} = {} kPa", fixed(p0, 1)), Colour::Ink, Mark::Moment(p0))
-    .points("measured", Colour::Muted, &x, &y);
+    .with(format!("P_{{0}} = {} kPa", fixed(p0, 1)), Colour::Ink, Mark::Moment(p0));
+    let panel = if x.is_empty() { panel } else { panel.points("measured", Colour::Muted, &x, &y) };
     Figure::new(
         "deadband",
         "Deadband: blocked force against pressure",

@@ -75,8 +75,10 @@ fn identifiability(view: &View<'_>, section: &mut Section) {
             if condition > 300.0 {
                 "over this stroke they are similar, so single E_{k} are poorly determined. Their sum, which the controller uses, is \
                  determined much better."
-            } else {
+            } else if s.not_determined.is_empty() {
                 "low enough to identify each E_{k}."
+            } else {
+                "low enough. What limits the parameters below is the range of the recordings, or their noise."
             }
         )),
         None => section.text("The elastic columns are linearly dependent: not all E_{k} are identifiable from this stroke."),

@@ -48,6 +48,13 @@ impl FromIterator<[f64; 3]> for Banded {
 }
 
 impl<'a> View<'a> {
+    /// The pressure of the blocked force that the fit states, Pa: the highest held level, or the highest reading of a continuous range.
+    pub fn highest_pressure(&self) -> f64 {
+        let problem = &self.fit.solution.problem;
+        let level = self.levels.last().copied().filter(|_| problem.pressures.held);
+        level.unwrap_or(problem.points.pressure.high)
+    }
+
     pub fn new(fit: &'a Fit, campaign: &'a Campaign) -> Self {
         let muscle = model_core::muscle::Muscle::<f64>::build(&fit.table).ok();
         let l0 = fit.solution.problem.braid.rest_length();

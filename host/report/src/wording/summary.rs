@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use pam_diagnose::experiment::what_would_show;
+use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 
@@ -43,8 +44,12 @@ pub fn summary(d: &Diagnosis) -> String {
             Pattern::None => "no pattern".to_owned(),
             other => pattern(other),
         };
-        let _ =
-            writeln!(s, "\nUnexplained: {:.0} % of the excess error; {pattern}", 100.0 * d.unexplained.share);
+        let _ = writeln!(
+            s,
+            "\nUnexplained: {:.0} % {}; {pattern}",
+            100.0 * d.unexplained.share,
+            unexplained_base(d)
+        );
     }
     if let Some(n) = &d.next_experiment {
         let _ = writeln!(
@@ -64,6 +69,16 @@ pub fn summary(d: &Diagnosis) -> String {
         }
     }
     s
+}
+
+/// What the unexplained share is a share of.
+#[must_use]
+pub fn unexplained_base(d: &Diagnosis) -> &'static str {
+    if d.missing.iter().any(is_from_history) {
+        "of the squared error of unseen runs at the same mounting"
+    } else {
+        "of the excess error"
+    }
 }
 
 fn header(s: &mut String, d: &Diagnosis) {
@@ -86,6 +101,8 @@ fn header(s: &mut String, d: &Diagnosis) {
             Verdict::Explained => "EXPLAINED: the effects below explain the model's error above the noise.",
             Verdict::PartlyExplained =>
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
+            Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) =>
+                "NOISE WITH MEMORY: the error does not repeat under the same conditions, and no effect of the library fits it.",
             Verdict::Unexplained =>
                 "UNEXPLAINED: the model has an error above the noise that no effect of the library explains well enough to be named.",
         }

@@ -109,7 +109,13 @@ pub(super) fn wraps(time: &SampleColumn) -> Option<(usize, u32)> {
 /// A time that does not increase at some rows of the same run.
 pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
     let rows = time.numbers.len();
-    let problem = if 4 * at > rows {
+    let backwards = time.numbers.windows(2).filter(|w| w[1] < w[0]).count();
+    let twice = time.numbers.windows(2).filter(|w| w[1] == w[0]).count();
+    let problem = if 2 * backwards > rows {
+        "time runs backwards: sort the rows by time".to_owned()
+    } else if 2 * (twice + 1) >= rows && time.numbers.chunks_exact(2).all(|pair| pair[0] == pair[1]) {
+        "every time is given twice: keep one of the two rows".to_owned()
+    } else if 4 * at > rows {
         "the clock is coarser than the rows: log more digits, or replace the time by sample_interval_s where rows are equally spaced"
             .to_owned()
     } else if let Some((row, bits)) = wraps(time) {

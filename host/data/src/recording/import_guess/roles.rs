@@ -205,7 +205,7 @@ fn described(
     }
     if quantity == Quantity::Contraction && column.name.is_relative_length() {
         (scale, offset) = (-scale, 1.0);
-    } else if quantity == Quantity::Contraction && -low > high {
+    } else if quantity == Quantity::Contraction && column.is_mostly_negative() {
         scale = -scale;
         guess.checks.push(on_column(format!(
             "{header} is negative where it is largest: its sign is reversed, so that shortening is positive"
@@ -219,7 +219,7 @@ fn described(
         }
         guess.checks.push(on_column(format!("{header}: {doubt}")));
     }
-    if quantity == Quantity::Force && -low > high && scale > 0.0 {
+    if quantity == Quantity::Force && column.is_mostly_negative() && scale > 0.0 {
         scale = -scale;
         guess.checks.push(on_column(format!(
             "{header} is negative where it is largest: its sign is reversed, so that pulling is positive"

@@ -10,16 +10,22 @@ const LEAST_ROWS: usize = 10;
 /// The columns, by their index, whose values set the runs of a file apart, none where time increases throughout; and how often time
 /// does not increase within the runs.
 pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usize) {
-    let time = &columns[time].numbers;
+    let clock = time;
+    let time = &columns[clock].numbers;
     let restarts: Vec<bool> = (0..time.len()).map(|i| i > 0 && !(time[i] > time[i - 1])).collect();
     let labels = |c: &SampleColumn| -> Option<bool> {
-        let levels = c.levels.as_ref().filter(|l| l.words.len() > 1)?;
+        let long = |l: &&Levels| l.words.len() > 1 && LEAST_ROWS * l.words.len() <= l.codes.len();
+        let levels = c.levels.as_ref().filter(long)?;
         // A label changes only where a run begins; what changes within a run is a measurement or a direction.
         let at_starts = levels.codes.windows(2).zip(&restarts[1..]).all(|(w, start)| w[0] == w[1] || *start);
         at_starts.then(|| c.name.sets_apart())
     };
-    let mut candidates: Vec<(bool, usize)> =
-        columns.iter().enumerate().filter_map(|(n, c)| Some((labels(c)?, n))).collect();
+    let mut candidates: Vec<(bool, usize)> = columns
+        .iter()
+        .enumerate()
+        .filter(|(n, _)| *n != clock)
+        .filter_map(|(n, c)| Some((labels(c)?, n)))
+        .collect();
     // Columns that are called run or condition before those of lengths and other settings.
     candidates.sort_by_key(|(named, n)| (!*named, *n));
     let mut chosen: Vec<usize> = Vec::new();

@@ -121,6 +121,18 @@ impl SampleColumn {
         self.numbers.iter().copied().filter(|v| v.is_finite())
     }
 
+    /// Whether the numbers reach further below zero than above it, without the farthest twentieth on each side: codes for missing readings,
+    /// such as −999, are no readings.
+    pub(super) fn is_mostly_negative(&self) -> bool {
+        let mut sorted: Vec<f64> = self.values().collect();
+        if sorted.is_empty() {
+            return false;
+        }
+        sorted.sort_unstable_by(f64::total_cmp);
+        let aside = sorted.len() * 5 / 100;
+        -sorted[aside] > sorted[sorted.len() - 1 - aside]
+    }
+
     /// The least and the greatest number.
     pub(super) fn range(&self) -> (f64, f64) {
         self.values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))

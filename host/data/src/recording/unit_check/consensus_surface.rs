@@ -7,22 +7,23 @@ use crate::statistics::{median, ranked};
 
 /// A muscle counts as pulling above this share of the campaign's usual largest force.
 const PULLS: f64 = 0.05;
-/// A recording is inconsistent if a fifth of its rows have a residual above this share of that force…
-pub(super) const FAR_OFF: f64 = 0.12;
+/// A recording is inconsistent if a fifth of its sections have a mean residual above this share of that force…
+pub(super) const FAR_OFF: f64 = 0.08;
 /// …and this many times the residual with the mistake corrected.
 const BETTER: f64 = 3.0;
 /// Another mistake whose residual is below this multiple of the best one is reported as an alternative.
 const AS_GOOD: f64 = 1.5;
-/// Corrected, it agrees with the others: within this share of the usual largest force, or this multiple of their own scatter.
-const AMONG: (f64, f64) = (0.02, 2.0);
-/// Upper limit of that residual, as a share of the usual largest force.
-const AMONG_AT_MOST: f64 = 0.15;
+/// Corrected, it agrees with the others within this share of that force: at the lowest and the highest pressure, the surface of the others
+/// is an extrapolation.
+const AGREES: f64 = 0.15;
 /// The expected force changes by at least this share between the lowest and the highest fifth of its rows.
 const CHANGES: f64 = 0.1;
 /// The others cover a stroke if one of their rows is nearer than this share of their range.
 const NEAR: f64 = 0.03;
 /// They cover a pressure up to this factor beyond their own range.
 const BEYOND: f64 = 1.6;
+/// Sections of a recording over which residuals are averaged.
+const SECTIONS: usize = 10;
 
 /// A row: pressure in Pa, stroke in m, force in N.
 pub(super) type Row = [f64; 3];
@@ -44,8 +45,14 @@ pub(super) struct ConsensusSurface {
     strokes: Vec<f64>,
     /// The usual largest force, N.
     largest: f64,
-    /// The 80 % quantile of their own residuals, as a share of that.
-    scatter: f64,
+}
+
+/// A recording that agrees once a mistake is corrected.
+pub(super) struct Judged {
+    /// Its residual then, as a share of the usual largest force.
+    pub(super) left: f64,
+    /// What was found.
+    pub(super) found: InconsistentRecording,
 }
 
 impl ConsensusSurface {
@@ -72,7 +79,6 @@ impl ConsensusSurface {
             stroke: (short, (long - short).max(1e-9)),
             strokes,
             largest,
-            scatter: 0.0,
         };
         let mut kept = rows.clone();
         for _ in 0..ROUNDS {
@@ -82,7 +88,6 @@ impl ConsensusSurface {
             let far = FAR * median(&mut sizes);
             kept = rows.iter().copied().filter(|r| off(r) <= far).collect();
         }
-        surface.scatter = surface.residual(&rows, None)?;
         Some(surface)
     }
 
@@ -110,23 +115,36 @@ impl ConsensusSurface {
     }
 
     /// Whether an inconsistent recording agrees once one mistake is corrected.
-    pub(super) fn judge(&self, sample: &Sample) -> Option<InconsistentRecording> {
+    pub(super) fn judge(&self, sample: &Sample) -> Option<Judged> {
         let as_read = self.residual(&sample.rows, None).filter(|off| *off >= FAR_OFF)?;
         let tried = mistakes(&sample.rows).filter_map(|m| Some((self.residual(&sample.rows, Some(&m))?, m)));
         let mut tried: Vec<(f64, Mistake)> = tried.collect();
         tried.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let (left, mistake) = tried.first().copied()?;
-        let among = AMONG.0.max(AMONG.1 * self.scatter);
         let next = tried.get(1).filter(|(next, _)| *next < AS_GOOD * left);
-        (left <= among.min(AMONG_AT_MOST) && as_read >= BETTER * left).then(|| InconsistentRecording {
-            recording: sample.recording,
-            mistake,
-            or: next.map(|(_, m)| *m),
+        (left <= AGREES && as_read >= BETTER * left).then(|| Judged {
+            left,
+            found: InconsistentRecording { recording: sample.recording, mistake, or: next.map(|(_, m)| *m) },
         })
     }
 
-    /// The 80 % quantile of a recording's residuals, as a share of the usual largest force; a slack muscle has no force. With a mistake
-    /// corrected `None` where the others do not cover most of the rows, or where the expected force hardly changes.
+    /// Sizes of the mean residuals of sections along pressure or stroke, whichever the recording covers more of, N: both directions of
+    /// motion are in each, and friction cancels.
+    fn section_means(&self, mut residuals: Vec<(Row, f64)>) -> Vec<f64> {
+        let place = |row: &Row| self.scaled(row[0], row[1]);
+        let range = |k: usize| {
+            let ends = residuals.iter().map(|(row, _)| place(row)[k]);
+            let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+            high - low
+        };
+        let along = usize::from(range(1) > range(0));
+        residuals.sort_unstable_by(|a, b| place(&a.0)[along].total_cmp(&place(&b.0)[along]));
+        let each = residuals.len().div_ceil(SECTIONS).max(1);
+        residuals.chunks(each).map(|s| (s.iter().map(|r| r.1).sum::<f64>() / s.len() as f64).abs()).collect()
+    }
+
+    /// The 80 % quantile of the mean residuals of a recording's sections, as a share of the usual largest force; a slack muscle has no
+    /// force. With a mistake corrected `None` where the others do not cover most of the rows, or where the expected force hardly changes.
     pub(super) fn residual(&self, rows: &[Row], mistake: Option<&Mistake>) -> Option<f64> {
         let rows: Vec<Row> = rows.iter().map(|r| mistake.map_or(*r, |m| m.of_row(*r))).collect();
         let known = rows.iter().filter(|r| self.covers(r[0], r[1])).count();
@@ -139,12 +157,9 @@ impl ConsensusSurface {
         };
         let four_fifths = |values: &mut Vec<f64>| quantile(values, 4);
         let fifth = |values: &mut Vec<f64>| quantile(values, 1);
-        let (mut made, mut sizes) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
-        for [p, x, f] in &rows {
-            let force = self.force(*p, *x).max(0.0);
-            made.push(force);
-            sizes.push((f - force).abs());
-        }
+        let mut made: Vec<f64> = rows.iter().map(|[p, x, _]| self.force(*p, *x).max(0.0)).collect();
+        let signed = rows.iter().zip(&made).map(|(row, force)| (*row, row[2] - force)).collect();
+        let mut sizes = self.section_means(signed);
         // A dead load cell agrees with any muscle without pressure, and one level agrees with many units: the force must change.
         let telling = mistake.is_none() || four_fifths(&mut made) - fifth(&mut made) >= CHANGES;
         telling.then(|| four_fifths(&mut sizes))
