@@ -172,18 +172,23 @@ impl<'a> Screened<'a> {
 
     fn place(&self, d: &Dropout) -> String {
         let r = &self.campaign.recordings[d.recording];
-        let row = |i: usize| 1 + r.rows.as_ref().map_or(i, |rows| rows[i] as usize);
-        let (first, last) = (d.rows.start, d.rows.end - 1);
         let kpa = |p: f64| format!("{:.1}", p / 1e3);
         let share = d.factor.map_or(String::new(), |f| {
             if f > 1.0 { format!(" (1/{f:.2} of it)") } else { format!(" ({:.2} times it)", 1.0 / f) }
         });
-        let place = if first == last {
-            format!("row {} ({:.2} s)", row(first), r.time[first])
-        } else {
-            format!("rows {} to {} ({:.2} to {:.2} s)", row(first), row(last), r.time[first], r.time[last])
-        };
+        let place = rows_and_times(r, &d.rows);
         format!("{} {place} from {} to {} kPa{share}", r.name, kpa(d.beside), kpa(d.read))
+    }
+}
+
+/// Rows of a recording, counted from 1 as in its file, and their times.
+pub(super) fn rows_and_times(r: &Recording, rows: &Range<usize>) -> String {
+    let row = |i: usize| 1 + r.rows.as_ref().map_or(i, |rows| rows[i] as usize);
+    let (first, last) = (rows.start, rows.end - 1);
+    if first == last {
+        format!("row {} ({:.2} s)", row(first), r.time[first])
+    } else {
+        format!("rows {} to {} ({:.2} to {:.2} s)", row(first), row(last), r.time[first], r.time[last])
     }
 }
 

@@ -21,7 +21,7 @@ mod tests;
 
 use std::ops::Range;
 
-use super::dropouts::ExpectedForce;
+use super::dropouts::{ExpectedForce, rows_and_times};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
 use crate::statistics::{median, quantile};
@@ -224,20 +224,11 @@ impl SensorFault {
 
     fn place(&self, campaign: &Campaign) -> String {
         let r = &campaign.recordings[self.recording];
-        let row = |i: usize| 1 + r.rows.as_ref().map_or(i, |rows| rows[i] as usize);
         let value = self.channel.text(self.value);
         if self.kind == Kind::Dead {
             return format!("`{}`, all {}, at {value}", r.name, pluralise(r.len(), "row"));
         }
-        let (first, last) = (self.rows.start, self.rows.end - 1);
-        format!(
-            "`{}` rows {} to {} ({:.2} to {:.2} s) at {value}",
-            r.name,
-            row(first),
-            row(last),
-            r.time[first],
-            r.time[last]
-        )
+        format!("`{}` {} at {value}", r.name, rows_and_times(r, &self.rows))
     }
 }
 

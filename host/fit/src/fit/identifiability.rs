@@ -61,6 +61,10 @@ pub struct NotDetermined {
 
 impl fmt::Display for NotDetermined {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // There is one deadband for all pressures.
+        if self.parameter == DEADBAND {
+            return write!(f, "{}: {}", self.parameter, self.reason);
+        }
         write!(f, "{} at ", self.parameter)?;
         if self.everywhere {
             f.write_str("every pressure")?;

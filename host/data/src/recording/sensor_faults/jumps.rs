@@ -1,6 +1,6 @@
 //! Drop-outs: the reading steps away within one row and back within one row, and no other reading steps. A step of the pressure must change
 //! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes of pressure and stroke are found
-//! by the same; those of the force are outliers of a fit.
+//! by the same, and single zeros of the force; its other spikes are outliers of a fit.
 
 use std::ops::Range;
 
@@ -46,7 +46,8 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
             let failed = match channel {
                 Channel::Pressure => is_unfelt(r, i..end, usual),
                 Channel::Stroke => is_unfelt(r, i..end, usual) || quiet(i) && quiet(end),
-                Channel::Force => false,
+                // Loggers write zero for a reading that they missed; other spikes may be a shock.
+                Channel::Force => column[i..end].iter().all(|f| *f == 0.0) && quiet(i) && quiet(end),
             };
             if failed {
                 found.push(drop_out(index, i..end, channel, column[i]));

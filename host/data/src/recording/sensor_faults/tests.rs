@@ -191,6 +191,19 @@ fn spikes_of_pressure_and_stroke_are_found() {
 
 /// Staircases of the pressure at held lengths: the shortened muscle pulls with a tenth of the largest force.
 #[test]
+fn single_zeros_of_a_force_that_pulls_are_found() {
+    let pulls = |f: f64| f > 25.0;
+    let clean = campaign(7);
+    let found = faults(&spoiled(7, Channel::Force, |c| {
+        c.iter_mut().step_by(37).filter(|f| pulls(**f)).for_each(|f| *f = 0.0);
+    }));
+    let r = &clean.recordings[found.first().expect("zeros are found").recording];
+    let lost = (1..r.len()).step_by(37).filter(|i| pulls(r.force.as_ref().expect("a force")[i - 1])).count();
+    assert!(found.len() * 10 >= lost * 9, "{} of {lost}", found.len());
+    assert!(found.iter().all(|f| f.kind == Kind::DropOut && f.rows.len() == 1 && f.value == 0.0));
+}
+
+#[test]
 fn a_pressure_of_zero_throughout_is_found_though_the_muscle_pulls_little() {
     let staircase = |stroke: f64, run: usize| {
         let rows = 1200;
