@@ -2,6 +2,7 @@
 
 use pam_campaign::campaign::Done;
 use pam_campaign::engine::Engine;
+use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
 use pam_fit::confidence_band::HALF_95;
 use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, wording};
 
@@ -10,7 +11,7 @@ use crate::documents::campaign as document;
 /// Builds the page.
 pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) -> Page {
     let mut page = Page::new("A campaign that chose its own steps", told.muscle.clone());
-    let tone = if told.complete { Tone::Good } else { Tone::Caution };
+    let tone = if told.complete && settled(engine, told) { Tone::Good } else { Tone::Caution };
     page.verdict(tone, told.ended_by.clone());
     page.fact(
         "bench time",
@@ -26,10 +27,7 @@ pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) 
     page.push(course_section(told));
     page.push(time_section(engine, course, told));
     if let Some(diagnosis) = engine.diagnosis() {
-        let mut section = Section::new("Diagnosis").summarised();
-        section.listing(wording::summary(diagnosis));
-        section.text("`diagnosis.html` in the same folder shows it with pictures.");
-        page.push(section);
+        page.push(diagnosis_section(diagnosis));
     }
     page.push(table_section(told));
     page.push(tracking_section(told));
@@ -39,6 +37,32 @@ pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) 
         page.origin(step.file.clone(), format!("{} rows", step.rows));
     }
     page
+}
+
+/// Whether the table has the wanted error and the model explains the recordings.
+fn settled(engine: &Engine, told: &document::Campaign) -> bool {
+    let error = told.table.as_ref().and_then(|t| Some((t.predicted_error_pct?, t.wanted_error_pct)));
+    let known = error.is_none_or(|(predicted, wanted)| predicted <= wanted);
+    let explained =
+        |d: &Diagnosis| d.judged() && matches!(d.verdict(), Verdict::Consistent | Verdict::Explained);
+    known && engine.diagnosis().is_none_or(explained)
+}
+
+/// The verdict, what is missing, and what to do next.
+fn diagnosis_section(diagnosis: &Diagnosis) -> Section {
+    let mut section = Section::new("Diagnosis").summarised();
+    section.text(wording::verdict(diagnosis));
+    let named = |m: &Missing| {
+        format!("`{}` (probability {:.0} %): {}", m.effect, 100.0 * m.probability, m.summary)
+    };
+    if !diagnosis.missing.is_empty() {
+        section.list(diagnosis.missing.iter().map(named).collect::<Vec<String>>());
+    }
+    if let Some(next) = &diagnosis.next_experiment {
+        section.text(format!("Next experiment: {}.", wording::proposal(&next.proposal)));
+    }
+    section.text("`diagnosis.html` in the same folder shows the whole answer with pictures.");
+    section
 }
 
 fn course_section(told: &document::Campaign) -> Section {
@@ -93,23 +117,25 @@ fn time_section(engine: &Engine, course: &[Done], told: &document::Campaign) -> 
             panel("stroke ΔL", "mm", &stroke, Colour::Series(1)),
         ],
     ));
-    let known: Vec<(f64, f64)> = course
+    let mut known: Vec<(f64, f64)> = course
         .iter()
         .filter(|d| d.chosen.predicted_error > 0.0)
         .map(|d| (d.clock_s.0, 100.0 * d.chosen.predicted_error / engine.places().blocked.max(1e-9)))
         .collect();
+    // Each step begins with the error that was expected before it; the last one is known at the end.
+    known.extend(told.table.as_ref().and_then(|t| Some((told.bench_s, t.predicted_error_pct?))));
     if known.len() > 1 {
         let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
         let wanted = told.table.as_ref().map_or(0.0, |t| t.wanted_error_pct);
         let panel = Panel::new(
             Axis::new("time", "s"),
-            Axis::new("predicted error", "% of blocked force").from_zero(),
+            Axis::new("expected error", "% of blocked force").from_zero(),
         )
-        .line("predicted", Colour::Series(0), &x, &y)
+        .line("expected", Colour::Series(0), &x, &y)
         .dashes("wanted", Colour::Ink, &[x[0], x[x.len() - 1]], &[wanted, wanted]);
         section.figure(Figure::new(
             "campaign-error",
-            "Predicted standard error of the table on unseen pressures and strokes",
+            "Expected standard error of the table between the tested pressures and strokes",
             "The campaign ends early where it falls below the dashed line and the diagnosis is settled.",
             panel,
         ));
@@ -132,14 +158,14 @@ fn table_section(told: &document::Campaign) -> Section {
     table.row(["mean error".to_owned(), format!("{:.3} % of blocked force", t.mean_error_pct)]);
     if let Some(error) = t.left_out_pressure_mean_error_pct {
         table.row([
-            "each pressure predicted from the others".to_owned(),
+            "each pressure predicted from the others, the outer ones by extrapolation".to_owned(),
             format!("{error:.3} % of blocked force"),
         ]);
     }
     if let Some(error) = t.predicted_error_pct {
         let wanted = t.wanted_error_pct;
         table.row([
-            "predicted standard error on unseen pressures and strokes".to_owned(),
+            "expected standard error between the tested pressures and strokes, if the model is right".to_owned(),
             format!("{error:.3} % of blocked force; target: {wanted:.2} %"),
         ]);
     }
