@@ -275,7 +275,8 @@ fn alternatives(d: &Diagnosis) -> Section {
         let mut odds: Vec<(String, f64)> = vec![(m.effect.clone(), m.probability)];
         let others = m.confusable_with.iter().filter_map(|c| d.considered.iter().find(|k| k.effect == *c));
         odds.extend(others.map(|c| (c.effect.clone(), c.gain)));
-        if odds.len() > 1 {
+        // The share of a memory is one of unseen runs; those of the others are of the recordings without it.
+        if odds.len() > 1 && !is_from_history(m) {
             let mut table = Table::new(
                 "Share of the excess error that each explains alone",
                 &["effect", "share of the excess error (%)"],
@@ -451,7 +452,8 @@ fn looked_at(d: &Diagnosis) -> Section {
         }
         section.table(table);
     }
-    let mut considered: Vec<_> = d.considered.iter().collect();
+    let named = |effect: &str| d.missing.iter().any(|m| m.effect == effect);
+    let mut considered: Vec<_> = d.considered.iter().filter(|c| !named(&c.effect)).collect();
     considered.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut table = Table::new("Effects not named", &["effect", "share explained alone (%)", "reason"]);
     for c in considered {

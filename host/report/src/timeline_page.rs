@@ -80,7 +80,7 @@ fn quantities(visits: &[Visit], found: &Timeline, kind: Kind, title: &str) -> Se
             name(&series.what),
             shown(series.points.first()),
             shown(series.points.last()),
-            judged(course),
+            judged(series, course),
         ]);
     }
     section.table(table);

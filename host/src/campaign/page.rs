@@ -52,9 +52,8 @@ fn settled(engine: &Engine, told: &document::Campaign) -> bool {
 fn diagnosis_section(diagnosis: &Diagnosis) -> Section {
     let mut section = Section::new("Diagnosis").summarised();
     section.text(wording::verdict(diagnosis));
-    let named = |m: &Missing| {
-        format!("`{}` (probability {:.0} %): {}", m.effect, 100.0 * m.probability, m.summary)
-    };
+    let named =
+        |m: &Missing| format!("`{}` (probability {:.0} %): {}", m.effect, 100.0 * m.probability, m.summary);
     if !diagnosis.missing.is_empty() {
         section.list(diagnosis.missing.iter().map(named).collect::<Vec<String>>());
     }
@@ -127,12 +126,10 @@ fn time_section(engine: &Engine, course: &[Done], told: &document::Campaign) -> 
     if known.len() > 1 {
         let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
         let wanted = told.table.as_ref().map_or(0.0, |t| t.wanted_error_pct);
-        let panel = Panel::new(
-            Axis::new("time", "s"),
-            Axis::new("expected error", "% of blocked force").from_zero(),
-        )
-        .line("expected", Colour::Series(0), &x, &y)
-        .dashes("wanted", Colour::Ink, &[x[0], x[x.len() - 1]], &[wanted, wanted]);
+        let panel =
+            Panel::new(Axis::new("time", "s"), Axis::new("expected error", "% of blocked force").from_zero())
+                .line("expected", Colour::Series(0), &x, &y)
+                .dashes("wanted", Colour::Ink, &[x[0], x[x.len() - 1]], &[wanted, wanted]);
         section.figure(Figure::new(
             "campaign-error",
             "Expected standard error of the table between the tested pressures and strokes",
@@ -165,7 +162,8 @@ fn table_section(told: &document::Campaign) -> Section {
     if let Some(error) = t.predicted_error_pct {
         let wanted = t.wanted_error_pct;
         table.row([
-            "expected standard error between the tested pressures and strokes, if the model is right".to_owned(),
+            "expected standard error between the tested pressures and strokes, if the model is right"
+                .to_owned(),
             format!("{error:.3} % of blocked force; target: {wanted:.2} %"),
         ]);
     }

@@ -39,6 +39,15 @@ pub fn summary(d: &Diagnosis) -> String {
             h.with_turns_after_N
         );
     }
+    if d.missing.is_empty() && d.judged() && h.rms_before_N > 0.0 {
+        let _ = writeln!(
+            s,
+            "\nError of the plain model on held-out rows ({}): {:.3} N rms; noise {:.3} N",
+            split(h.split),
+            h.rms_before_N,
+            h.noise_N
+        );
+    }
     if d.verdict() != Verdict::Consistent {
         let pattern = match &d.unexplained.pattern {
             Pattern::None => "no pattern".to_owned(),

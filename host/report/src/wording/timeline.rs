@@ -236,7 +236,8 @@ pub fn summary(visits: &[Visit], found: &Timeline) -> String {
             .flatten()
             .map(|p| p.as_ref().map_or_else(|| "–".to_owned(), |p| point(p, &series.unit)))
             .collect();
-        let _ = writeln!(text, "  {:26} {}  ({})", name(&series.what), ends.join(" → "), judged(course));
+        let _ =
+            writeln!(text, "  {:26} {}  ({})", name(&series.what), ends.join(" → "), judged(series, course));
     }
     for warning in warnings(visits, found) {
         let _ = writeln!(text, "note: {warning}");
@@ -244,11 +245,23 @@ pub fn summary(visits: &[Visit], found: &Timeline) -> String {
     text
 }
 
+/// Whether two values have intervals that do not overlap: something differs, be it a change or the scatter between campaigns.
+fn beyond_repeats(series: &Series) -> bool {
+    let intervals: Vec<(f64, f64)> = series.points.iter().flatten().filter_map(Point::interval).collect();
+    let highest = intervals.iter().map(|i| i.0).fold(f64::NEG_INFINITY, f64::max);
+    let lowest = intervals.iter().map(|i| i.1).fold(f64::INFINITY, f64::min);
+    highest > lowest
+}
+
 /// The text on the trend of a quantity.
 #[must_use]
-pub fn judged(course: &Course) -> String {
+pub fn judged(series: &Series, course: &Course) -> String {
     match (course.too_few, course.changes.len()) {
         (true, _) => "too few campaigns to judge".to_owned(),
+        (_, 0) if beyond_repeats(series) => format!(
+            "no change named, probability of none {:.2}; values differ by more than their repeats: record more campaigns",
+            course.none
+        ),
         (_, 0) => format!("no change named, probability of none {:.2}", course.none),
         (_, 1) => "one change".to_owned(),
         (_, n) => format!("{n} changes"),
