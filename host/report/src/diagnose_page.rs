@@ -13,7 +13,6 @@ use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
-use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 use pam_fit::RecordingResidual;
 use pam_fit::bench::Candidate;
@@ -77,14 +76,9 @@ fn percent(part: f64, whole: f64) -> String {
     if whole > 0.0 { figures(100.0 * part / whole, 2) } else { "–".into() }
 }
 
-/// Whether tables that differ between pressures hide an error of the model.
-fn one_bladder_misfits(d: &Diagnosis) -> bool {
-    d.remarks.iter().any(|r| matches!(r, Remark::Concealed { .. }))
-}
-
 fn header(page: &mut Page, d: &Diagnosis) {
     let tone = match d.verdict() {
-        Verdict::Consistent if d.judged() && !one_bladder_misfits(d) => Tone::Good,
+        Verdict::Consistent if d.judged() && !wording::one_bladder_misfits(d) => Tone::Good,
         Verdict::Unexplained => Tone::Bad,
         Verdict::Consistent | Verdict::Explained | Verdict::PartlyExplained => Tone::Caution,
     };
@@ -100,7 +94,7 @@ fn header(page: &mut Page, d: &Diagnosis) {
             percent(d.misfit_rms_N, d.blocked_force_N),
             figures(d.noise_N, 2)
         ),
-        if d.verdict() == Verdict::Consistent && !one_bladder_misfits(d) {
+        if d.verdict() == Verdict::Consistent && !wording::one_bladder_misfits(d) {
             Tone::Good
         } else {
             Tone::Caution
@@ -143,7 +137,7 @@ fn recommendation(d: &Diagnosis) -> Section {
     let mut steps = Vec::new();
     if !d.judged() {
         steps.push("Correct what the remarks name, and record again.".to_owned());
-    } else if d.missing.is_empty() && d.verdict() == Verdict::Consistent && one_bladder_misfits(d) {
+    } else if d.missing.is_empty() && d.verdict() == Verdict::Consistent && wording::one_bladder_misfits(d) {
         steps.push(
             "Use the table of `host fit` at the tested pressures only, with the error that it states: one bladder does not describe all \
              pressures. The remarks name what could be the cause."

@@ -14,7 +14,7 @@ mod why;
 mod why_not;
 
 pub use experiment::{measure, proposal};
-pub use outcome::{pattern, split, verdict};
+pub use outcome::{one_bladder_misfits, pattern, split, verdict};
 pub use region::region;
 pub use remark::{remark, reserve};
 pub use summary::{summary, unexplained_base};

@@ -39,7 +39,7 @@ pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) 
     page
 }
 
-/// Whether the table has the wanted error and the model explains the recordings.
+/// Whether the table has the target error and the model explains the recordings.
 fn settled(engine: &Engine, told: &document::Campaign) -> bool {
     let error = told.table.as_ref().and_then(|t| Some((t.predicted_error_pct?, t.wanted_error_pct)));
     let known = error.is_none_or(|(predicted, wanted)| predicted <= wanted);

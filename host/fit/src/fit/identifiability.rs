@@ -61,7 +61,7 @@ pub struct NotDetermined {
 
 impl fmt::Display for NotDetermined {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // There is one deadband for all pressures.
+        // One deadband holds for all pressures.
         if self.parameter == DEADBAND {
             return write!(f, "{}: {}", self.parameter, self.reason);
         }

@@ -1,8 +1,15 @@
 //! The judgement, the residual, and how rows were held out.
 
+use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Pattern, Split, Verdict};
 
 use super::{list, region, remark};
+
+/// Whether tables that differ between pressures hide an error of the model.
+#[must_use]
+pub fn one_bladder_misfits(d: &Diagnosis) -> bool {
+    d.remarks.iter().any(|r| matches!(r, Remark::Concealed { .. }))
+}
 
 /// The judgement in one sentence.
 #[must_use]
@@ -11,6 +18,9 @@ pub fn verdict(d: &Diagnosis) -> String {
     match d.verdict() {
         Verdict::Consistent if !d.judged() => {
             "These recordings do not allow a judgement of the model.".to_owned()
+        }
+        Verdict::Consistent if one_bladder_misfits(d) => {
+            "Model and recordings agree at each pressure, but one bladder does not describe all pressures.".to_owned()
         }
         Verdict::Consistent => {
             "Model and recordings agree: no error exceeds the noise and the model's stated inexactness.".to_owned()

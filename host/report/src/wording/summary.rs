@@ -8,7 +8,9 @@ use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
 
 use super::experiment::needs_strokes;
-use super::{measure, pattern, proposal, region, remark, sentence, split, why, with_interval};
+use super::{
+    measure, one_bladder_misfits, pattern, proposal, region, remark, sentence, split, why, with_interval,
+};
 use crate::effect_page::place;
 
 /// The diagnosis as text for a terminal.
@@ -103,6 +105,8 @@ fn header(s: &mut String, d: &Diagnosis) {
         match d.verdict() {
             Verdict::Consistent if !judged =>
                 "NOT JUDGED: these recordings do not allow a judgement of the model; see the remarks.",
+            Verdict::Consistent if one_bladder_misfits(d) =>
+                "CONSISTENT AT EACH PRESSURE: no error exceeds the noise there, but one bladder does not describe all pressures.",
             Verdict::Consistent =>
                 "CONSISTENT: no error exceeds the noise and the model's stated inexactness.",
             Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
