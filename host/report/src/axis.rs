@@ -123,7 +123,10 @@ pub(crate) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
     let power = 10f64.powf(raw.log10().floor());
     // The nearest round step, not the next larger one, or half the ticks would be lost.
     let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * power >= raw * 0.7).unwrap_or(10.0);
-    let step = factor * power;
+    let count = |step: f64| (high / step + 1e-9).floor() - (low / step - 1e-9).ceil() + 1.0;
+    // One number alone gives no scale.
+    let finer = [factor, 5.0, 2.0, 1.0, 0.5].into_iter().filter(|f| *f <= factor);
+    let step = finer.map(|f| f * power).find(|step| count(*step) >= 2.0).unwrap_or(factor * power);
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     let largest = low.abs().max(high.abs());
     let first = (low / step - 1e-9).ceil() as i64;
@@ -259,6 +262,7 @@ mod tests {
         assert_eq!(texts(&linear_ticks(0.0, 0.08, 5)), ["0.00", "0.02", "0.04", "0.06", "0.08"]);
         assert_eq!(texts(&linear_ticks(-1.0, 1.0, 4)), ["−1.0", "−0.5", "0.0", "0.5", "1.0"]);
         assert_eq!(texts(&linear_ticks(0.0, 3e6, 3)), ["0", "10^{6}", "2·10^{6}", "3·10^{6}"]);
+        assert_eq!(texts(&linear_ticks(-45.0, 45.0, 2)), ["−40", "−20", "0", "20", "40"]);
         assert!(linear_ticks(1.0, 1.0, 5).is_empty());
         assert!(linear_ticks(f64::NAN, 1.0, 5).is_empty());
     }

@@ -109,15 +109,13 @@ pub fn by_date(found: &Timeline) -> Vec<(&Series, &Change)> {
 /// One change as a sentence without a full stop.
 #[must_use]
 pub fn change(visits: &[Visit], series: &Series, change: &Change) -> String {
-    let between = |from: &Visit, to: &Visit| {
-        format!("{} (`{}`) and {} (`{}`)", day(from.date), from.name, day(to.date), to.name)
-    };
+    let between = |from: &Visit, to: &Visit| format!("{} and {}", dated(from), dated(to));
     let (from, to) = (&visits[change.from], &visits[change.to]);
     let when = match change.how {
         How::AtOnce => format!("in one step, between {}", between(from, to)),
         How::Gradual => format!("gradually, between {}", between(from, to)),
         How::NotDetermined => {
-            format!("in one step or gradually, around {} (`{}`)", day(to.date), to.name)
+            format!("in one step or gradually, around {}", dated(to))
         }
     };
     format!(
@@ -126,6 +124,12 @@ pub fn change(visits: &[Visit], series: &Series, change: &Change) -> String {
         with_interval(change.size, Some(HALF_95 * change.std), &series.unit),
         change.probability
     )
+}
+
+/// The date of a campaign, and its name where that is another.
+fn dated(visit: &Visit) -> String {
+    let date = day(visit.date);
+    if visit.name == date { date } else { format!("{date} (`{}`)", visit.name) }
 }
 
 /// Warnings for the reader.
