@@ -69,6 +69,14 @@ pub(crate) fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRe
         campaign.recordings.iter().enumerate().filter(|(_, r)| long_enough(r)).map(of).collect();
     let Some(largest) = usual_largest(&samples) else { return Vec::new() };
     let Some((others, odd)) = consensus(&samples, largest) else { return Vec::new() };
+    // Where recordings differ and no mistake explains some of them, the muscle or the bench changed: that may imitate a mistake.
+    let changed = |i: &usize| {
+        others.residual(&samples[*i].rows, None).is_some_and(|off| off >= FAR_OFF)
+            && others.judge(&samples[*i]).is_none()
+    };
+    if odd.iter().any(changed) {
+        return Vec::new();
+    }
     odd.into_iter().filter_map(|i| others.judge(&samples[i])).map(|judged| judged.found).collect()
 }
 

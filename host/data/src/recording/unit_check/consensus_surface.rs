@@ -10,7 +10,7 @@ const PULLS: f64 = 0.05;
 /// A recording is inconsistent if a fifth of its sections have a mean residual above this share of that force…
 pub(super) const FAR_OFF: f64 = 0.08;
 /// …and this many times the residual with the mistake corrected.
-const BETTER: f64 = 3.0;
+const BETTER: f64 = 4.0;
 /// Another mistake whose residual is below this multiple of the best one is reported as an alternative.
 const AS_GOOD: f64 = 1.5;
 /// Corrected, it agrees with the others within this share of that force: at the lowest and the highest pressure, the surface of the others
