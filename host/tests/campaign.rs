@@ -120,3 +120,14 @@ fn a_muscle_without_a_limit_is_refused_before_anything_moves() {
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("weight_N"), "{said}");
 }
+
+#[test]
+fn a_rig_that_the_virtual_bench_does_not_have_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = folder.path().join("rig.toml");
+    std::fs::write(&rig, "axis = \"weight\"\nweight_N = 30\n").unwrap();
+    let made = campaign(folder.path()).arg("--rig").arg(&rig).stderr(Stdio::piped()).output().unwrap();
+    assert_eq!(made.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&made.stderr).into_owned();
+    assert!(said.contains("no hanging weight"), "{said}");
+}

@@ -196,3 +196,28 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn rows_in_reverse_order_are_no_recordings_of_one_row() {
+    let text = rows(plain);
+    let reversed = text.lines().rev().fold(String::new(), |all, line| all + line + "\n");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("newest_first.csv");
+    std::fs::write(&path, format!("time_s,pressure_bar,displacement_mm,force_N\n{reversed}")).unwrap();
+    let guessed = guess(&path, None).unwrap();
+    assert!(!guessed.description.contains("split_by"), "{}", guessed.description);
+    assert!(guessed.description.contains("time runs backwards"), "{}", guessed.description);
+}
+
+#[test]
+fn a_code_for_missing_readings_does_not_turn_the_sign_of_the_force() {
+    let text = rows(plain);
+    let with_code = text.lines().enumerate().fold(String::new(), |all, (n, line)| {
+        let (start, _) = line.rsplit_once(',').unwrap();
+        all + &if n == 11 { format!("{start},-999\n") } else { format!("{line}\n") }
+    });
+    let (guessed, read) =
+        by_guess(&format!("time_s,pressure_bar,displacement_mm,force_N\n{with_code}"), None);
+    assert!(!guessed.description.contains("its sign is reversed"), "{}", guessed.description);
+    assert!(read[0].require_force().unwrap()[0] > 0.0);
+}

@@ -217,6 +217,9 @@ fn thin_data_are_fitted_with_a_word_of_warning() {
         fitted.summary.warnings
     );
     assert!(fitted.summary.left_out_pressure_mean_error_pct.is_none());
+    // No interval for what one pressure does not separate.
+    assert_eq!(fitted.summary.not_determined.first().map(|n| n.parameter.as_str()), Some("P0"));
+    assert!(!fitted.summary.to_string().lines().next().unwrap_or("").contains('±'), "{}", fitted.summary);
     fitted.table.check().expect("a table that can be used");
     // One way only.
     let mut up = one.clone();

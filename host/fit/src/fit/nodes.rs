@@ -188,6 +188,24 @@ mod tests {
     }
 
     #[test]
+    fn the_pressure_of_a_slow_recording_is_a_level_beside_a_fast_one() {
+        let held = |rows: usize, interval: f64, pressure: f64| Recording {
+            time: (0..rows).map(|i| i as f64 * interval).collect(),
+            stroke: (0..rows).map(|i| 1e-3 * (i as f64 * interval).sin()).collect(),
+            force: Some(vec![1.0; rows]),
+            pressure: (0..rows).map(|i| pressure + 500.0 * (i as f64 * 0.7).sin()).collect(),
+            ..Recording::default()
+        };
+        // A minute each: 240 of 120,240 rows are at the lower pressure.
+        let recordings = vec![held(240, 0.25, 200e3), held(60_000, 1e-3, 300e3), held(60_000, 1e-3, 400e3)];
+        let motions: Vec<Motion> =
+            recordings.iter().map(|r| Motion { direction: vec![1; r.len()], ..Motion::default() }).collect();
+        let found = pressures(&points(&Screened::of(&Campaign::new(recordings)), &motions), 500e3);
+        assert_eq!(found.levels.len(), 3, "{found:?}");
+        assert!((found.levels[0] - 200e3).abs() < 1e3, "{found:?}");
+    }
+
+    #[test]
     fn levels_with_ripple_and_ramps_between_are_found() {
         let levels = [207e3, 276e3, 345e3, 414e3, 483e3, 552e3];
         let mut p = Vec::new();
