@@ -1,6 +1,7 @@
 //! What is wrong with a file for every reader: words among numbers, rows without numbers, clocks that go back.
 
 use super::others::Others;
+use super::runs;
 use super::sample::{Sample, SampleColumn};
 use super::{Guess, GuessedColumn, Note, Source, roles};
 use crate::pluralise::pluralise;
@@ -109,12 +110,8 @@ pub(super) fn wraps(time: &SampleColumn) -> Option<(usize, u32)> {
 /// A time that does not increase at some rows of the same run.
 pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
     let rows = time.numbers.len();
-    let backwards = time.numbers.windows(2).filter(|w| w[1] < w[0]).count();
-    let twice = time.numbers.windows(2).filter(|w| w[1] == w[0]).count();
-    let problem = if 2 * backwards > rows {
+    let problem = if runs::runs_backwards(time) {
         "time runs backwards: sort the rows by time".to_owned()
-    } else if 2 * (twice + 1) >= rows && time.numbers.chunks_exact(2).all(|pair| pair[0] == pair[1]) {
-        "every time is given twice: keep one of the two rows".to_owned()
     } else if 4 * at > rows {
         "the clock is coarser than the rows: log more digits, or replace the time by sample_interval_s where rows are equally spaced"
             .to_owned()

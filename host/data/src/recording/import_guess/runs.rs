@@ -13,6 +13,10 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
     let clock = time;
     let time = &columns[clock].numbers;
     let restarts: Vec<bool> = (0..time.len()).map(|i| i > 0 && !(time[i] > time[i - 1])).collect();
+    // Where time runs backwards, every row would begin a run.
+    if runs_backwards(&columns[clock]) {
+        return (Vec::new(), restarts.iter().filter(|r| **r).count());
+    }
     let labels = |c: &SampleColumn| -> Option<bool> {
         let long = |l: &&Levels| l.words.len() > 1 && LEAST_ROWS * l.words.len() <= l.codes.len();
         let levels = c.levels.as_ref().filter(long)?;
@@ -49,6 +53,11 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
     }
     chosen.sort_unstable();
     (chosen, left)
+}
+
+/// Whether time decreases at most rows.
+pub(super) fn runs_backwards(time: &SampleColumn) -> bool {
+    2 * time.numbers.windows(2).filter(|w| w[1] < w[0]).count() > time.numbers.len()
 }
 
 /// Whether the clock begins again with each run: wherever the time goes back, it goes back to where it began.

@@ -57,7 +57,7 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
         }
         let end = if edge(i) && quiet(i) { end_of(r, column, i, edge) } else { None };
         match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
-            Some(end) if channel != Channel::Pressure || is_unfelt(r, i..end, usual) => {
+            Some(end) if is_away(r, channel, i..end, usual) => {
                 found.push(drop_out(index, i..end, channel, column[i]));
                 i = end + 1;
             }
@@ -69,6 +69,19 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
 
 fn drop_out(recording: usize, rows: Range<usize>, channel: Channel, value: f64) -> SensorFault {
     SensorFault { recording, rows, channel, kind: Kind::DropOut, value }
+}
+
+/// Whether the reading is wrong in these rows, and not beside them: the pressure is unfelt there, or the force is farther from what is
+/// expected than the reading before.
+fn is_away(r: &Recording, channel: Channel, rows: Range<usize>, usual: &Usual) -> bool {
+    match channel {
+        Channel::Pressure => is_unfelt(r, rows, usual),
+        Channel::Stroke => true,
+        Channel::Force => {
+            let (force, expected) = (channel.of(r), usual.expected.at(r, rows.start));
+            (force[rows.start] - expected).abs() > (force[rows.start - 1] - expected).abs()
+        }
+    }
 }
 
 /// Whether the force stays while the reading of pressure or stroke is away, though the expected force does not.
