@@ -69,15 +69,18 @@ pub(crate) fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRe
         campaign.recordings.iter().enumerate().filter(|(_, r)| long_enough(r)).map(of).collect();
     let Some(largest) = usual_largest(&samples) else { return Vec::new() };
     let Some((others, odd)) = consensus(&samples, largest) else { return Vec::new() };
-    // Where recordings differ and no mistake explains some of them, the muscle or the bench changed: that may imitate a mistake.
-    let changed = |i: &usize| {
-        others.residual(&samples[*i].rows, None).is_some_and(|off| off >= FAR_OFF)
-            && others.judge(&samples[*i]).is_none()
-    };
-    if odd.iter().any(changed) {
-        return Vec::new();
+    let mut found = Vec::new();
+    for i in odd {
+        match others.judge(&samples[i]) {
+            Some(judged) => found.push(judged.found),
+            // Where recordings differ and no mistake explains one, the muscle or the bench changed: that may imitate a mistake.
+            None if others.residual(&samples[i].rows, None).is_some_and(|off| off >= FAR_OFF) => {
+                return Vec::new();
+            }
+            None => {}
+        }
     }
-    odd.into_iter().filter_map(|i| others.judge(&samples[i])).map(|judged| judged.found).collect()
+    found
 }
 
 /// The surface on which most recordings agree, and those that do not, in order; `None` where all agree.

@@ -20,6 +20,7 @@ use crate::recording::source;
 use crate::recording::time_of_day;
 #[cfg(feature = "excel")]
 use crate::recording::workbook;
+use crate::statistics::quantile;
 
 /// Bytes of a text that are looked at: some hundred thousand rows.
 const LOOKED_AT: u64 = 32 << 20;
@@ -124,13 +125,8 @@ impl SampleColumn {
     /// Whether the numbers reach further below zero than above it, without the farthest twentieth on each side: codes for missing readings,
     /// such as −999, are no readings.
     pub(super) fn is_mostly_negative(&self) -> bool {
-        let mut sorted: Vec<f64> = self.values().collect();
-        if sorted.is_empty() {
-            return false;
-        }
-        sorted.sort_unstable_by(f64::total_cmp);
-        let aside = sorted.len() * 5 / 100;
-        -sorted[aside] > sorted[sorted.len() - 1 - aside]
+        let mut values: Vec<f64> = self.values().collect();
+        !values.is_empty() && -quantile(&mut values, 0.05) > quantile(&mut values, 0.95)
     }
 
     /// The least and the greatest number.
