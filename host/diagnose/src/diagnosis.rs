@@ -9,8 +9,8 @@ use super::candidates::{Candidate, library};
 use super::confirmation::select_and_confirm;
 use super::criteria::baseline::{TABLE_ORDER, WALL};
 use super::criteria::judgement::{
-    EXPLAINED, EXPLAINED_REST, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA, LINE_SHARE,
-    LINE_UNEXPLAINED, PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
+    EXPLAINED, EXPLAINED_REST, EXPLAINED_TURNS, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA,
+    LINE_SHARE, LINE_UNEXPLAINED, PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
 };
 use super::criteria::rows::{NO_LOAD, SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
@@ -119,7 +119,9 @@ fn settle(
     remarks: &mut Vec<Remark>,
 ) -> Result<Settled, Unjudgeable> {
     let screened = screen(rows, blocked, pushed, remarks)?;
-    let (rows, law) = rest_friction::settle_rest_friction(&screened);
+    let (ramps, turning) = rest_friction::settle_ramps(&screened);
+    remarks.extend(turning.map(|law| Remark::FrictionTurns { over: law.most_done() }));
+    let (rows, law) = rest_friction::settle_rest_friction(&ramps);
     remarks.extend(law.map(|law| Remark::FrictionAtRest(law.into())));
     // The model as it was: four orders, tables free over pressure.
     let production = baselines::fit(&rows, Kind::Flexible(TABLE_ORDER), &[]);
@@ -309,12 +311,14 @@ fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Ve
     }
 }
 
-/// Whether the effects remove most of the excess error on held-out rows, or leave no more than the model admits (N).
+/// Whether the effects remove most of the excess error on held-out rows, or leave no more than the model admits (N), and do no harm
+/// about the reversals.
 fn removes_on_unseen(held_out: &HeldOut, admitted: f64) -> bool {
     let excess = |rms: f64| (rms.powi(2) - held_out.noise_N.powi(2)).max(0.0);
     let (before, after) = (excess(held_out.rms_before_N), excess(held_out.rms_after_N));
     let near_noise = held_out.rms_after_N <= EXPLAINED_REST * held_out.noise_N;
-    after <= admitted.powi(2) || near_noise && after <= (1.0 - EXPLAINED_UNSEEN) * before
+    let harmless = held_out.with_turns_after_N <= EXPLAINED_TURNS * held_out.with_turns_before_N;
+    harmless && (after <= admitted.powi(2) || near_noise && after <= (1.0 - EXPLAINED_UNSEEN) * before)
 }
 
 /// Forces that the answer states.

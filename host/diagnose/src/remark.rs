@@ -110,6 +110,11 @@ pub enum Remark {
     Slack(f64),
     /// Friction while the length is held.
     FrictionAtRest(RestFriction),
+    /// On ramps of the pressure at held length friction turns slowly; rows on which it still turns are excluded.
+    FrictionTurns {
+        /// Change of pressure over which it turns by 63 %, Pa.
+        over: f64,
+    },
     /// Readings at the end of the force sensor's range, excluded.
     SensorEnd {
         /// Rows.

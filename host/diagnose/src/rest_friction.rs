@@ -18,7 +18,10 @@ use super::criteria::rest_friction::{
 use super::remark;
 use super::rows::{RestFriction, Rows};
 
+mod ramps;
 mod steps;
+
+pub(crate) use ramps::Turning;
 
 /// The law of friction at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,6 +141,19 @@ fn energy_at_rest(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], dire
         }
     }
     sum
+}
+
+/// Finds over which change of the pressure friction turns on ramps at held length: the rows that can be judged, and the law; none where
+/// it turns at once or no rows move by which friction is known.
+pub(crate) fn settle_ramps(rows: &Rows) -> (Rows, Option<Turning>) {
+    if !rows.on_ramp.iter().any(|r| *r) {
+        return (rows.clone(), None);
+    }
+    let moving = rows.without(|i| rows.contexts()[i].speed == 0.0);
+    if moving.effective() < FEWEST_MOVING_ROWS {
+        return (rows.clone(), None);
+    }
+    ramps::settle(rows, &baselines::fit(&moving, Kind::Flexible(TABLE_ORDER), &[]))
 }
 
 /// Finds the law of friction at rest: the rows with its directions, and the law; none where friction stays as the model holds it.

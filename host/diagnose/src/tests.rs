@@ -4,6 +4,7 @@
 
 pub(crate) mod added;
 mod plays;
+mod ramps;
 
 use model_core::braid::Geometry;
 use model_core::muscle::Muscle;

@@ -227,6 +227,9 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         table.row([letter.to_owned(), p.name.clone(), figures(p.value, 3), std, unit, remark.into()]);
     }
     section.table(table);
+    if let Some(traded) = wording::traded_off(m) {
+        section.text(wording::sentence(traded));
+    }
     section.text(if m.given {
         format!("*Evidence:* {}.", wording::why(&m.why))
     } else {

@@ -17,7 +17,7 @@ pub use experiment::{measure, proposal};
 pub use outcome::{one_bladder_misfits, pattern, split, verdict};
 pub use region::region;
 pub use remark::{remark, reserve};
-pub use summary::{summary, unexplained_base};
+pub use summary::{summary, traded_off, unexplained_base};
 pub use value::with_interval;
 pub use why::why;
 pub use why_not::why_not;

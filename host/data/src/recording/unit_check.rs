@@ -74,7 +74,7 @@ pub(crate) fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRe
         match others.judge(&samples[i]) {
             Some(judged) => found.push(judged.found),
             // Where recordings differ and no mistake explains one, the muscle or the bench changed: that may imitate a mistake.
-            None if others.residual(&samples[i].rows, None).is_some_and(|off| off >= FAR_OFF) => {
+            None if others.is_far_off(&samples[i]) => {
                 return Vec::new();
             }
             None => {}
@@ -96,8 +96,7 @@ fn consensus(samples: &[Sample], largest: f64) -> Option<(ConsensusSurface, Vec<
         ConsensusSurface::on(rest, largest)
     };
     let mut consensus = without(&kept, None)?;
-    let error_of =
-        |consensus: &ConsensusSurface, i: usize| consensus.residual(&samples[i].rows, None).unwrap_or(0.0);
+    let error_of = |consensus: &ConsensusSurface, i: usize| consensus.residual(&samples[i].rows);
     let most = MOST_ODD.min((samples.len() - 1) / 2);
     while odd.len() < most {
         let far = if odd.is_empty() { SEARCH_FROM } else { FAR_OFF };

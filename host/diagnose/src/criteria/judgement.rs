@@ -26,6 +26,8 @@ pam_data::criteria! {
     EXPLAINED_UNSEEN: f64 = 0.5, "q_unseen", "1", Convention("half: more remains than is explained below it");
     /// ... and leave no more than this multiple of the noise there.
     EXPLAINED_REST: f64 = 2.0, "s_unseen/s", "1", Convention("twice the noise: the rest is no larger than what noise and model leave elsewhere");
+    /// ... and do not raise the error by more than this factor where the rows about each reversal count, too.
+    EXPLAINED_TURNS: f64 = 1.05, "s_turns/s_0", "1", Judgement;
     /// p from which a line of the spectrum is real.
     LINE_ALPHA: f64 = 0.02, "p_line", "1", Convention("2 %, the second smallest p of 99 shuffles");
     /// ... that holds this share of the residual's energy.

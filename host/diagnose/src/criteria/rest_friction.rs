@@ -42,4 +42,16 @@ pam_data::criteria! {
     STEP_BESIDE: usize = 5, "m_beside", "1", Judgement;
     /// Rows before a step soon after a hold's beginning, at least.
     STEP_BEFORE: usize = 2, "m_before", "1", Judgement;
+    /// A hold with ramps is looked at from this many rows on at which the muscle pulls.
+    RAMP_ROWS: usize = 50, "N_ramp", "1", Derived("eight rows for each of the six numbers that are fitted to a hold");
+    /// Changes of pressure that static friction carries on a ramp, half-widths of the play that are tried.
+    RAMP_CARRIED: ([f64; 3]) = [0.0, 1.0e3, 3.0e3], "h_ramp", "Pa", Judgement;
+    /// Shares of friction that turn later than the rest, tried.
+    LATER_SHARES: ([f64; 2]) = [0.25, 0.5], "q_late", "1", Judgement;
+    /// Over how many times the change of pressure they turn. A decade could not be told from the table's own error over the pressure.
+    LATER_TIMES: f64 = 3.0, "b_late/b", "1", Derived("half a decade");
+    /// Friction turns slowly on a ramp where the law of it leaves less than this share of the error that it leaves when it turns at once.
+    RAMP_LAW_LEAVES: f64 = 0.7, "S_ramp/S_0", "1", Judgement;
+    /// A row of a ramp is judged once friction is within this of its full direction.
+    RAMP_TURNED: f64 = 0.1, "1 - z_ramp", "1", Judgement;
 }

@@ -34,6 +34,11 @@ pub fn remark(remark: &Remark) -> String {
             .to_owned(),
         Remark::Slack(share) => format!("{:.0} % of the rows excluded: muscle slack", 100.0 * share),
         Remark::FrictionAtRest(law) => friction_at_rest(*law),
+        Remark::FrictionTurns { over } => format!(
+            "after a reversal of the pressure at held length, friction turns by 63 % over {:.1} kPa. The model turns it at once, so \
+             rows of a pressure ramp are excluded while it turns",
+            over * 1e-3
+        ),
         Remark::SensorEnd { rows, force } => format!(
             "{} of exactly {force:.2} N excluded: end of the force sensor's range",
             pluralise(*rows, "reading")

@@ -5,11 +5,12 @@ use std::fmt::Write;
 use pam_diagnose::experiment::what_would_show;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
-use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
+use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict};
 
 use super::experiment::needs_strokes;
 use super::{
-    measure, one_bladder_misfits, pattern, proposal, region, remark, sentence, split, why, with_interval,
+    HALF_95, measure, one_bladder_misfits, pattern, proposal, region, remark, sentence, split, why,
+    with_interval,
 };
 use crate::effect_page::place;
 
@@ -146,6 +147,9 @@ fn effect(s: &mut String, m: &Missing) {
         let odd = if p.outside_known_range { "   outside the published range" } else { "" };
         let _ = writeln!(s, "  {} = {}{odd}", p.name, with_interval(p.value, p.std, &p.unit));
     }
+    if let Some(traded) = traded_off(m) {
+        let _ = writeln!(s, "  {traded}");
+    }
     if !m.confusable_with.is_empty() {
         let _ =
             writeln!(s, "  these recordings do not distinguish it from: {}", m.confusable_with.join(", "));
@@ -156,6 +160,18 @@ fn effect(s: &mut String, m: &Missing) {
             "  an error of the bench, not of the muscle: it corrects the data and is not sent to the controller"
         );
     }
+}
+
+/// What to say where the intervals of single parameters include zero although the size of the whole effect is determined.
+#[must_use]
+pub fn traded_off(m: &Missing) -> Option<&'static str> {
+    let includes_zero =
+        |p: &ParameterValue| p.value != 0.0 && p.std.is_some_and(|s| HALF_95 * s >= p.value.abs());
+    let tested = !m.given && !m.checked && !is_from_history(m);
+    (tested && m.parameters.iter().any(includes_zero)).then_some(
+        "the force of this effect is determined (the 95 % interval of its size excludes zero), its single parameters are not: \
+         one compensates another",
+    )
 }
 
 /// What may be there unseen, by what would show it; and what checks of the bench have excluded.

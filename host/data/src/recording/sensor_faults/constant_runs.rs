@@ -19,6 +19,11 @@ const MOVES_MUCH: (f64, f64) = (0.30, 6.0);
 const USUAL: f64 = 0.5;
 /// Where constant readings are the rule.
 const ALWAYS: f64 = 0.95;
+/// Over a run in which the pressure changes by more than this share of its range, the length may be held: then the force follows the
+/// expected one up to a scale, as the surface is least exact at the ends of the stroke, and up to this share of its own change, friction.
+const RAMPS: f64 = 0.2;
+const HELD_SCALE: (f64, f64) = (0.5, 2.0);
+const HELD_LEAVES: f64 = 0.25;
 /// A saturated force: the expected force lies above it by this share of the range of forces.
 const ABOVE: f64 = 0.10;
 /// A reading below this share of the range of forces may be a slack muscle.
@@ -158,8 +163,27 @@ fn contradicted(r: &Recording, rows: &Range<usize>, channel: Channel, bound: f64
             value > usual.expected.floor() + SLACK * usual.spans[2]
                 && spread(&|i| usual.expected.at(r, i)) > bound
         }
+        Channel::Stroke if spread(&|i| r.pressure[i]) > RAMPS * usual.spans[0] => {
+            let scale = held_scale(r, rows.clone().step_by(stride), usual);
+            let force = |i: usize| usual.expected.residual(r, i) + usual.expected.at(r, i);
+            let left = spread(&|i| force(i) - scale * usual.expected.at(r, i));
+            left > bound.max(HELD_LEAVES * spread(&force))
+        }
         Channel::Pressure | Channel::Stroke => spread(&|i| usual.expected.residual(r, i)) > bound,
     }
+}
+
+/// By how much the force at these rows changes for each newton of the expected force, within what a held length allows.
+fn held_scale(r: &Recording, rows: impl Iterator<Item = usize>, usual: &Usual) -> f64 {
+    let at = |i: usize| (usual.expected.at(r, i), usual.expected.at(r, i) + usual.expected.residual(r, i));
+    let points: Vec<(f64, f64)> = rows.map(at).collect();
+    let count = points.len().max(1) as f64;
+    let (expected, force) = points.iter().fold((0.0, 0.0), |(e, f), p| (e + p.0 / count, f + p.1 / count));
+    let (cross, square) = points
+        .iter()
+        .fold((0.0, 0.0), |(c, s), p| (c + (p.0 - expected) * (p.1 - force), s + (p.0 - expected).powi(2)));
+    let scale = if square > 0.0 { cross / square } else { 1.0 };
+    scale.clamp(HELD_SCALE.0, HELD_SCALE.1)
 }
 
 fn ends(column: &[f64]) -> (f64, f64) {

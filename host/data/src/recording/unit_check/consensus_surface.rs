@@ -1,7 +1,7 @@
 //! The surface of force over pressure and stroke on which most recordings of a campaign agree, and the distance of a recording from it.
 
 use super::mistake::{Mistake, mistakes};
-use super::{InconsistentRecording, Sample};
+use super::{InconsistentRecording, LEAST_ROWS, Sample};
 use crate::recording::force_surface::{ForceSurface, TERMS};
 use crate::statistics::{median, ranked};
 
@@ -22,6 +22,11 @@ const CHANGES: f64 = 0.1;
 const NEAR: f64 = 0.03;
 /// They cover a pressure up to this factor beyond their own range.
 const BEYOND: f64 = 1.6;
+/// The surface is trusted at a stroke where the recordings that it is fitted to are, in the median, nearer to it than this share of the
+/// usual largest force: half of what makes another recording inconsistent. A steep beginning of the stroke is more than it follows.
+const FOLLOWED: f64 = 0.5 * FAR_OFF;
+/// Parts of the strokes' range in which that is looked at.
+const PARTS: usize = 33;
 /// Sections of a recording over which residuals are averaged.
 const SECTIONS: usize = 10;
 
@@ -45,6 +50,8 @@ pub(super) struct ConsensusSurface {
     strokes: Vec<f64>,
     /// The usual largest force, N.
     largest: f64,
+    /// Whether the surface follows the recordings in each part of the strokes' range.
+    followed: Vec<bool>,
 }
 
 /// A recording that agrees once a mistake is corrected.
@@ -58,8 +65,10 @@ pub(super) struct Judged {
 impl ConsensusSurface {
     /// Fits the rows of some recordings that pull; `None` of too few.
     pub(super) fn on<'a>(samples: impl Iterator<Item = &'a Sample>, largest: f64) -> Option<Self> {
-        let pulls = |r: &Row| r[2].abs() > PULLS * largest;
-        let rows: Vec<Row> = samples.flat_map(|s| &s.rows).copied().filter(pulls).collect();
+        let pulls = |r: &&Row| r[2].abs() > PULLS * largest;
+        let recordings: Vec<Vec<Row>> =
+            samples.map(|s| s.rows.iter().filter(pulls).copied().collect()).collect();
+        let rows = recordings.concat();
         if rows.len() < 5 * TERMS {
             return None;
         }
@@ -79,6 +88,7 @@ impl ConsensusSurface {
             stroke: (short, (long - short).max(1e-9)),
             strokes,
             largest,
+            followed: Vec::new(),
         };
         let mut kept = rows.clone();
         for _ in 0..ROUNDS {
@@ -88,7 +98,39 @@ impl ConsensusSurface {
             let far = FAR * median(&mut sizes);
             kept = rows.iter().copied().filter(|r| off(r) <= far).collect();
         }
+        surface.followed = surface.follows(&recordings);
         Some(surface)
+    }
+
+    /// Which part of the strokes' range a stroke is in.
+    fn part(&self, stroke: f64) -> usize {
+        let at = self.scaled(0.0, stroke)[1];
+        ((at * PARTS as f64) as usize).min(PARTS - 1)
+    }
+
+    /// Whether the surface follows the recordings in each part of the strokes' range. Both directions are in the mean of a recording, and
+    /// friction cancels; the median over recordings is not moved by a single wrong one.
+    fn follows(&self, recordings: &[Vec<Row>]) -> Vec<bool> {
+        let mut means = vec![Vec::new(); PARTS];
+        for rows in recordings {
+            let mut sums = vec![(0.0, 0); PARTS];
+            for [p, x, f] in rows {
+                let (sum, count) = &mut sums[self.part(*x)];
+                *sum += f - self.force(*p, *x);
+                *count += 1;
+            }
+            for (means, (sum, count)) in means.iter_mut().zip(sums).filter(|(_, (_, count))| *count > 0) {
+                means.push(sum / f64::from(count));
+            }
+        }
+        let near = |means: &mut Vec<f64>| means.is_empty() || median(means).abs() <= FOLLOWED * self.largest;
+        means.iter_mut().map(near).collect()
+    }
+
+    /// The rows of a recording but those at strokes where the surface does not follow the others.
+    fn comparable(&self, rows: &[Row]) -> Vec<Row> {
+        let known = |x: f64| ((x - self.stroke.0) / self.stroke.1 - 0.5).abs() <= 0.5 + NEAR;
+        rows.iter().copied().filter(|r| !known(r[1]) || self.followed[self.part(r[1])]).collect()
     }
 
     fn fitted(&self, rows: &[Row]) -> Option<ForceSurface> {
@@ -116,8 +158,15 @@ impl ConsensusSurface {
 
     /// Whether an inconsistent recording agrees once one mistake is corrected.
     pub(super) fn judge(&self, sample: &Sample) -> Option<Judged> {
-        let as_read = self.residual(&sample.rows, None).filter(|off| *off >= FAR_OFF)?;
-        let tried = mistakes(&sample.rows).filter_map(|m| Some((self.residual(&sample.rows, Some(&m))?, m)));
+        let as_read = Some(self.residual(&sample.rows)).filter(|off| *off >= FAR_OFF)?;
+        let corrected = |m: Mistake| {
+            let rows: Vec<Row> = sample.rows.iter().map(|r| m.of_row(*r)).collect();
+            let comparable = self.comparable(&rows);
+            // The rows that are compared must be most of the recording.
+            (4 * comparable.len() >= 3 * rows.len()).then_some(())?;
+            Some((self.corrected_residual(&comparable)?, m))
+        };
+        let tried = mistakes(&sample.rows).filter_map(corrected);
         let mut tried: Vec<(f64, Mistake)> = tried.collect();
         tried.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let (left, mistake) = tried.first().copied()?;
@@ -143,25 +192,31 @@ impl ConsensusSurface {
         residuals.chunks(each).map(|s| (s.iter().map(|r| r.1).sum::<f64>() / s.len() as f64).abs()).collect()
     }
 
-    /// The 80 % quantile of the mean residuals of a recording's sections, as a share of the usual largest force; a slack muscle has no
-    /// force. With a mistake corrected `None` where the others do not cover most of the rows, or where the expected force hardly changes.
-    pub(super) fn residual(&self, rows: &[Row], mistake: Option<&Mistake>) -> Option<f64> {
-        let rows: Vec<Row> = rows.iter().map(|r| mistake.map_or(*r, |m| m.of_row(*r))).collect();
+    /// Whether a recording as read is inconsistent with the others, strokes left out at which the surface does not follow them.
+    pub(super) fn is_far_off(&self, sample: &Sample) -> bool {
+        let comparable = self.comparable(&sample.rows);
+        comparable.len() >= LEAST_ROWS && self.residual(&comparable) >= FAR_OFF
+    }
+
+    /// The residual of rows with a mistake corrected: `None` where the others do not cover most of them, or where the expected force
+    /// hardly changes. A dead load cell agrees with any muscle without pressure, and one level agrees with many units.
+    fn corrected_residual(&self, rows: &[Row]) -> Option<f64> {
         let known = rows.iter().filter(|r| self.covers(r[0], r[1])).count();
-        if mistake.is_some() && 4 * known < 3 * rows.len() {
-            return None;
-        }
-        let quantile = |values: &mut Vec<f64>, fifths: usize| {
-            let rank = values.len() * fifths / 5;
-            ranked(values, rank) / self.largest
-        };
-        let four_fifths = |values: &mut Vec<f64>| quantile(values, 4);
-        let fifth = |values: &mut Vec<f64>| quantile(values, 1);
         let mut made: Vec<f64> = rows.iter().map(|[p, x, _]| self.force(*p, *x).max(0.0)).collect();
-        let signed = rows.iter().zip(&made).map(|(row, force)| (*row, row[2] - force)).collect();
-        let mut sizes = self.section_means(signed);
-        // A dead load cell agrees with any muscle without pressure, and one level agrees with many units: the force must change.
-        let telling = mistake.is_none() || four_fifths(&mut made) - fifth(&mut made) >= CHANGES;
-        telling.then(|| four_fifths(&mut sizes))
+        let changes = self.share(&mut made, 4) - self.share(&mut made, 1);
+        (!rows.is_empty() && 4 * known >= 3 * rows.len() && changes >= CHANGES).then(|| self.residual(rows))
+    }
+
+    /// The 80 % quantile of the mean residuals of a recording's sections, as a share of the usual largest force; a slack muscle has no
+    /// force.
+    pub(super) fn residual(&self, rows: &[Row]) -> f64 {
+        let signed = rows.iter().map(|row| (*row, row[2] - self.force(row[0], row[1]).max(0.0))).collect();
+        self.share(&mut self.section_means(signed), 4)
+    }
+
+    /// A quantile in fifths, as a share of the usual largest force.
+    fn share(&self, values: &mut [f64], fifths: usize) -> f64 {
+        let rank = values.len() * fifths / 5;
+        ranked(values, rank) / self.largest
     }
 }

@@ -127,3 +127,27 @@ fn an_inconsistent_recording_is_reported_with_the_remedy() {
     assert!(screened.read(3).iter().all(|read| !read) && screened.read(2).iter().all(|read| *read));
     assert!((screened.campaign.recordings[3].pressure[0] - 450e3).abs() < 1.0, "good enough to follow");
 }
+
+/// The force of many muscles falls steeply at the beginning of the stroke, which a smooth surface does not follow. A pressure ramp at
+/// rest length lies wholly there.
+#[test]
+fn a_ramp_at_rest_length_where_the_force_falls_steeply_has_no_wrong_unit() {
+    // About the force that one more atmosphere makes.
+    let steep = |x: f64| 45.0 * (-x / 0.3e-3).exp();
+    let mut recordings = campaign();
+    for r in &mut recordings {
+        let force = r.force.as_mut().expect("a force");
+        force.iter_mut().zip(&r.stroke).for_each(|(f, x)| *f += steep(*x));
+    }
+    let pressure: Vec<f64> = (0..400).map(|i| 550e3 * (1.0 - (f64::from(i) / 200.0 - 1.0).abs())).collect();
+    let ramp = Recording {
+        name: "ramp".into(),
+        time: (0..400).map(|i| f64::from(i) * 0.1).collect(),
+        stroke: vec![0.0; 400],
+        force: Some(pressure.iter().map(|p| ((p - 60e3) * 5e-4 + steep(0.0)).max(0.0)).collect()),
+        pressure,
+        ..Recording::default()
+    };
+    recordings.push(ramp);
+    assert_eq!(found(&recordings), []);
+}
