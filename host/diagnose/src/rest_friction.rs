@@ -143,8 +143,8 @@ fn energy_at_rest(rows: &Rows, fitted: &Baseline, holds: &[(usize, usize)], dire
     sum
 }
 
-/// Finds over which change of the pressure friction turns on ramps at held length: the rows that can be judged, and the law; none where
-/// it turns at once or no rows move by which friction is known.
+/// Finds over which change of the pressure friction turns on ramps at held length: the rows that can be judged, and the law. There is no
+/// law if friction turns without delay, or if too few rows move to know the friction.
 pub(crate) fn settle_ramps(rows: &Rows) -> (Rows, Option<Turning>) {
     if !rows.on_ramp.iter().any(|r| *r) {
         return (rows.clone(), None);

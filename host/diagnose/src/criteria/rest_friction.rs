@@ -48,9 +48,9 @@ pam_data::criteria! {
     RAMP_CARRIED: ([f64; 3]) = [0.0, 1.0e3, 3.0e3], "h_ramp", "Pa", Judgement;
     /// Shares of friction that turn later than the rest, tried.
     LATER_SHARES: ([f64; 2]) = [0.25, 0.5], "q_late", "1", Judgement;
-    /// Over how many times the change of pressure they turn. A decade could not be told from the table's own error over the pressure.
+    /// Over how many times the change of pressure they turn. A decade is not distinguishable from the table's own error over the pressure.
     LATER_TIMES: f64 = 3.0, "b_late/b", "1", Derived("half a decade");
-    /// Friction turns slowly on a ramp where the law of it leaves less than this share of the error that it leaves when it turns at once.
+    /// Friction turns slowly on a ramp where the law of it leaves less than this share of the error of a law without any delay.
     RAMP_LAW_LEAVES: f64 = 0.7, "S_ramp/S_0", "1", Judgement;
     /// A row of a ramp is judged once friction is within this of its full direction.
     RAMP_TURNED: f64 = 0.1, "1 - z_ramp", "1", Judgement;

@@ -35,7 +35,7 @@ impl Turning {
         let left = |p: f64| {
             (1.0 - self.later) * (-p / self.over).exp() + self.later * (-p / (self.over * LATER_TIMES)).exp()
         };
-        // What is left falls; it is 1/e for one set of bristles by itself, and between the two for both.
+        // The rest falls to 1/e after the one change for the first set of bristles, and after the other for the second.
         let (mut low, mut high) = (self.over, self.over * LATER_TIMES);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);

@@ -35,7 +35,7 @@ pub fn remark(remark: &Remark) -> String {
         Remark::Slack(share) => format!("{:.0} % of the rows excluded: muscle slack", 100.0 * share),
         Remark::FrictionAtRest(law) => friction_at_rest(*law),
         Remark::FrictionTurns { over } => format!(
-            "after a reversal of the pressure at held length, friction turns by 63 % over {:.1} kPa. The model turns it at once, so \
+            "after a reversal of the pressure at held length, friction turns by 63 % over {:.1} kPa. The model turns it without delay, so \
              rows of a pressure ramp are excluded while it turns",
             over * 1e-3
         ),

@@ -116,13 +116,17 @@ impl Repeats {
         }
     }
 
-    /// The habit of the other recordings, or of this one where there are no others.
+    /// The habit of the other recordings, or of this one where there are no others. A column that is constant throughout, such as a held
+    /// length, does not show how the others repeat their readings.
     fn of_others(&self, index: usize, channel: Channel) -> Habit {
         let columns =
             Channel::ALL.iter().position(|c| *c == channel).map_or(&[][..], |c| &self.columns[c][..]);
         let alone = columns.len() < 2;
         let (mut equal, mut all, mut longest) = (0, 0, 1);
-        for (_, c) in columns.iter().enumerate().filter(|(i, _)| alone || *i != index) {
+        let others = || columns.iter().enumerate().filter(|(i, _)| alone || *i != index).map(|(_, c)| c);
+        let varies = |c: &&Column| c.equal < c.all;
+        let held = !others().any(|c| varies(&c));
+        for c in others().filter(|c| held || varies(c)) {
             (equal, all, longest) = (equal + c.equal, all + c.all, longest.max(c.longest));
         }
         Habit { equal: equal as f64 / all.max(1) as f64, longest: (!alone).then_some(longest) }
