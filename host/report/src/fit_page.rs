@@ -80,7 +80,12 @@ fn header(page: &mut Page, view: &View<'_>) {
                 worst = tone(unseen, 2.0 * GOOD, BAD);
             }
         }
-        None => verdict += ". The recordings have one pressure only: forces at others are not identifiable.",
+        None => {
+            verdict += ". The recordings have one pressure only: forces at others are not identifiable.";
+            if worst == Tone::Good {
+                worst = Tone::Caution;
+            }
+        }
     }
     verdict += match worst {
         Tone::Bad => " Do not use it for control before the warnings below are resolved.",

@@ -286,24 +286,39 @@ fn to_text(
         }
     }
     text += &stock_text(cases, stock);
-    text += "\nWhere the error is: mean of F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n";
+    text += &where_it_is(cases, lengths);
+    text
+}
+
+/// The residuals at the contractions and in the recordings of each muscle, under a heading; empty where no muscle has any to list.
+fn where_it_is(cases: &[Case], lengths: &[Option<LengthTransfer>]) -> String {
+    let mut text = String::new();
     for (case, length) in cases.iter().zip(lengths) {
-        text += &format!("{}\n", case.muscle.name);
+        let mut listed = String::new();
         if let Some(held) = &case.runs {
-            text += &places("run", &held.spots);
-            let table = recording_table(&held.recordings);
-            if !table.is_empty() {
-                text += &format!("held-out {table}\n");
-            }
+            listed += &places("run", &held.spots);
         }
         if let Some(held) = &case.contractions {
-            text += &places("left out", &held.spots);
+            listed += &places("left out", &held.spots);
         }
         if let Some(length) = length {
-            text += &places("length of", &length.spots);
+            listed += &places("length of", &length.spots);
+        }
+        if let Some(held) = &case.runs {
+            let table = recording_table(&held.recordings);
+            if !table.is_empty() {
+                listed += &format!("held-out {table}\n");
+            }
+        }
+        if !listed.is_empty() {
+            text += &format!("{}\n{listed}", case.muscle.name);
         }
     }
-    text
+    if text.is_empty() {
+        return text;
+    }
+    "\nWhere the error is: mean of F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n".to_owned()
+        + &text
 }
 
 /// The errors with the stock, one line for each muscle. Behind each: the mean error that unknown lengths, zeros and scale alone would give.
