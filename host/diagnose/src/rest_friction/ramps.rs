@@ -62,7 +62,7 @@ impl Turning {
     }
 }
 
-/// A hold whose pressure ramps both ways: the rows at which the muscle pulls.
+/// A hold on which the pressure ramps.
 struct Ramps {
     from: usize,
     to: usize,
@@ -71,7 +71,7 @@ struct Ramps {
     begun: f64,
     /// Rows at its beginning whose direction is unknown.
     unknown: usize,
-    /// Rows that tell, counted from the first of the hold.
+    /// Rows that show the law: those at which the muscle pulls, counted from the first of the hold. Empty where the pressure ramps one way.
     telling: Vec<usize>,
 }
 
@@ -83,14 +83,16 @@ fn ramps(rows: &Rows, fitted: &Baseline) -> Vec<Ramps> {
     let indices: Vec<usize> = (0..rows.len()).collect();
     for stretch in indices.chunk_by(|a, b| held(*a) == held(*b) && rows.recording[*a] == rows.recording[*b]) {
         let to = from + stretch.len();
-        let both = |way: f64| (from..to).any(|i| rows.on_ramp[i] && rows.sign[i] == way);
-        if held(from) && both(1.0) && both(-1.0) {
+        let ramps = |way: f64| (from..to).any(|i| rows.on_ramp[i] && rows.sign[i] == way);
+        if held(from) && (ramps(1.0) || ramps(-1.0)) {
             let pulls = |i: &usize| !rows.vented[*i] && fitted.quasi[*i] > 0.0 && rows.force[*i] > 0.0;
-            let telling: Vec<usize> = (from..to).filter(pulls).map(|i| i - from).collect();
-            if telling.len() >= RAMP_ROWS {
-                let (begun, unknown) = beginning(rows, from, to);
-                found.push(Ramps { from, to, begun, unknown, telling });
+            let mut telling: Vec<usize> = (from..to).filter(pulls).map(|i| i - from).collect();
+            // One way alone does not show a turn: the table's own error over the pressure looks like it.
+            if !(ramps(1.0) && ramps(-1.0)) || telling.len() < RAMP_ROWS {
+                telling.clear();
             }
+            let (begun, unknown) = beginning(rows, from, to);
+            found.push(Ramps { from, to, begun, unknown, telling });
         }
         from = to;
     }
@@ -155,9 +157,6 @@ fn law(rows: &Rows, fitted: &Baseline, ramps: &[Ramps]) -> Option<Turning> {
 /// law, where the ramps show one.
 pub(super) fn settle(rows: &Rows, fitted: &Baseline) -> (Rows, Option<Turning>) {
     let ramps = ramps(rows, fitted);
-    if ramps.is_empty() {
-        return (rows.clone(), None);
-    }
     let Some(law) = law(rows, fitted, &ramps) else { return (rows.clone(), None) };
     let mut turning = vec![false; rows.len()];
     let mut contexts = rows.contexts().to_vec();
