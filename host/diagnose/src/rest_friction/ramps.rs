@@ -15,9 +15,6 @@ use crate::criteria::rest_friction::{
 use crate::rows::Rows;
 use pam_fit::numerics::least_squares::least_squares;
 
-/// Halvings of an interval of a decade, to a thousandth of it.
-const HALVINGS: usize = 10;
-
 /// How friction turns while the pressure ramps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Turning {
@@ -37,7 +34,7 @@ impl Turning {
         };
         // The rest falls to 1/e after the one change for the first set of bristles, and after the other for the second.
         let (mut low, mut high) = (self.over, self.over * LATER_TIMES);
-        for _ in 0..HALVINGS {
+        while high - low > 1e-3 * self.over {
             let middle = 0.5 * (low + high);
             if left(middle) > (-1.0_f64).exp() { low = middle } else { high = middle }
         }
