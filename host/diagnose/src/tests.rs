@@ -3,7 +3,6 @@
 //! The force comes from a table muscle, friction and faults from plain formulas below, not from the library of effects.
 
 pub(crate) mod added;
-mod beginnings;
 mod plays;
 mod ramps;
 

@@ -8,7 +8,6 @@ use model_core::units::Length;
 use super::readings;
 use super::sleeve::{self, Shape};
 use crate::criteria::baseline::TABLE_ORDER;
-use crate::criteria::rest_friction::HOLD_ROWS;
 use crate::criteria::rows::{TARGET_ROWS, TURN_SAMPLES, TURNED_BACK};
 use crate::valve_pulses;
 use pam_data::error::Result;
@@ -136,21 +135,6 @@ fn doubt_until_the_muscle_turns(state: &mut MotionState, motion: &Motion, record
     }
 }
 
-/// Which way the muscle moved before a recording is unknown. Where it moves soon, its direction is in doubt until it has left its place; the
-/// first sample is in doubt in any case. Of a longer rest at the beginning the direction is found with friction at rest.
-fn doubt_the_beginning(state: &mut MotionState, motion: &Motion, recording: &Recording) {
-    let stroke = &recording.stroke;
-    let rested = state.held.iter().take_while(|held| **held).count();
-    if rested > HOLD_ROWS || stroke.is_empty() {
-        return;
-    }
-    let left = |i: &usize| (stroke[*i] - stroke[0]).abs() > TURNED_BACK * motion.stroke_threshold;
-    let first = rested.max(1).min(stroke.len());
-    let most = (first + TURN_SAMPLES).min(stroke.len());
-    let end = (first..most).find(left).unwrap_or(most);
-    state.sure[..end].fill(false);
-}
-
 impl Gathering<'_> {
     /// Appends a recording, `pause` seconds after the one before where that is known. Samples whose pressure was not `read` do not count.
     ///
@@ -172,7 +156,6 @@ impl Gathering<'_> {
         let samples = self.follower.follow(recording, motion, pause);
         let pressure_rate: Vec<f64> = samples.iter().map(|s| s.pressure_rate).collect();
         let mut state = motion.state(recording, &pressure_rate);
-        doubt_the_beginning(&mut state, motion, recording);
         if self.corrected {
             doubt_until_the_muscle_turns(&mut state, motion, recording);
         }
