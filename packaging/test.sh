@@ -11,25 +11,28 @@ fail() { echo "packaging: $1" >&2; exit 1; }
 mkdir "$work/archive" "$work/deb"
 tar -C "$work/archive" --strip-components=1 -xzf "$work"/dist/pam-*.tar.gz
 for called in pam host; do
-    "$work/archive/bin/$called" --version | grep -q "^$called " || fail "$called does not run from the archive"
+    grep -q "^$called " <<< "$("$work/archive/bin/$called" --version)" || fail "$called does not run from the archive"
 done
 grep -q pam "$work/archive/share/bash-completion/completions/pam" || fail "no completions for bash"
 for file in LICENSE-MIT LICENSE-APACHE VERSION sbom.cdx.json; do
     test -s "$work/archive/share/doc/pam/$file" || fail "$file is missing in the archive"
 done
 if [ -z "${1:-}" ] && command -v ldd > /dev/null; then
-    ldd "$work/archive/bin/pam" 2>&1 | grep -Eq "not a dynamic executable|statically linked" || fail "the binary is not static"
+    linked=$(ldd "$work/archive/bin/pam" 2>&1 || true)
+    grep -Eq "not a dynamic executable|statically linked" <<< "$linked" || fail "the binary is not static"
 fi
 
 if command -v dpkg-deb > /dev/null; then
     dpkg-deb -x "$work"/dist/pam_*.deb "$work/deb"
     needs=$(dpkg-deb -f "$work"/dist/pam_*.deb Depends)
-    if ldd "$work/deb/usr/bin/pam" 2> /dev/null | grep -q "libc\.so"; then
+    # Read whole: with pipefail a reader that ends early would make ldd fail.
+    linked=$(ldd "$work/deb/usr/bin/pam" 2> /dev/null || true)
+    if grep -q "libc\.so" <<< "$linked"; then
         case "$needs" in "libc6 (>= 2."*) ;; *) fail "the Debian package of a dynamic binary names no C library: $needs" ;; esac
     elif [ -n "$needs" ]; then
         fail "the Debian package of a static binary depends on $needs"
     fi
-    "$work/deb/usr/bin/pam" --version | grep -q "^pam " || fail "pam does not run from the Debian package"
+    grep -q "^pam " <<< "$("$work/deb/usr/bin/pam" --version)" || fail "pam does not run from the Debian package"
     test ! -e "$work/deb/usr/bin/host" || fail "the Debian package would replace another package's host"
     test -s "$work/deb/usr/share/doc/pam/copyright" || fail "the Debian package lacks its licences"
     grep -q "pam fit --muscle" "$work/deb/usr/share/doc/pam/README.md" || fail "the Debian package's README does not call pam"
