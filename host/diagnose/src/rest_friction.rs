@@ -96,6 +96,12 @@ fn slip_beyond_play(pressure: &[f64], carries: f64) -> Vec<f64> {
         .collect()
 }
 
+/// The friction's direction after the pressure has gone on by `slipped` (Pa) beyond what static friction carries: it follows over `over` (Pa).
+fn followed(direction: f64, slipped: f64, over: f64) -> f64 {
+    let way = if slipped > 0.0 { 1.0 } else { -1.0 };
+    way + (direction - way) * (-slipped.abs() / over).exp()
+}
+
 /// The friction's direction in every hold under a law.
 fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law: RestLaw) -> Vec<Vec<f64>> {
     match law {
@@ -114,8 +120,7 @@ fn directions(rows: &Rows, holds: &[(usize, usize)], pressures: &[Vec<f64>], law
                     slips[*from..*to]
                         .iter()
                         .map(|slipped| {
-                            let way = if *slipped > 0.0 { 1.0 } else { -1.0 };
-                            z = way + (z - way) * (-slipped.abs() / over).exp();
+                            z = followed(z, *slipped, over);
                             z
                         })
                         .collect()

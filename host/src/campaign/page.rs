@@ -12,11 +12,8 @@ use crate::documents::campaign as document;
 pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) -> Page {
     let mut page = Page::new("A campaign that chose its own steps", told.muscle.clone());
     let tone = if told.complete && settled(engine, told) { Tone::Good } else { Tone::Caution };
-    let diagnosis = engine.diagnosis().map(wording::verdict);
-    page.verdict(
-        tone,
-        [Some(told.ended_by.clone()), diagnosis].into_iter().flatten().collect::<Vec<_>>().join(" "),
-    );
+    let diagnosis = engine.diagnosis().map_or(String::new(), |d| format!(" {}", wording::verdict(d)));
+    page.verdict(tone, format!("{}{diagnosis}", told.ended_by));
     page.fact(
         "bench time",
         format!("{:.1} min", told.bench_s / 60.0),

@@ -74,9 +74,7 @@ pub(crate) fn inconsistent_recordings(campaign: &Campaign) -> Vec<InconsistentRe
         match others.judge(&samples[i]) {
             Some(judged) => found.push(judged.found),
             // Where recordings differ and no mistake explains one, the muscle or the bench changed: that may imitate a mistake.
-            None if others.is_far_off(&samples[i]) => {
-                return Vec::new();
-            }
+            None if others.is_far_off(&samples[i]) => return Vec::new(),
             None => {}
         }
     }

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::slip_beyond_play;
+use super::{followed, slip_beyond_play};
 use crate::baselines::Baseline;
 use crate::criteria::rest_friction::{
     FOLLOWING_PRESSURES, LATER_SHARES, LATER_TIMES, NEARBY_FACTORS, RAMP_CARRIED, RAMP_LAW_LEAVES, RAMP_ROWS,
@@ -44,15 +44,11 @@ impl Turning {
     /// Direction of friction along one hold that begins with a direction.
     fn directions(self, pressure: &[f64], begun: f64) -> Vec<f64> {
         let (mut soon, mut late) = (begun, begun);
-        let follow = |z: &mut f64, slipped: f64, over: f64| {
-            let way = if slipped > 0.0 { 1.0 } else { -1.0 };
-            *z = way + (*z - way) * (-slipped.abs() / over).exp();
-        };
         slip_beyond_play(pressure, self.carries)
             .into_iter()
             .map(|slipped| {
-                follow(&mut soon, slipped, self.over);
-                follow(&mut late, slipped, self.over * LATER_TIMES);
+                soon = followed(soon, slipped, self.over);
+                late = followed(late, slipped, self.over * LATER_TIMES);
                 (1.0 - self.later) * soon + self.later * late
             })
             .collect()

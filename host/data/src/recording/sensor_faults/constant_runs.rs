@@ -168,8 +168,10 @@ fn contradicted(r: &Recording, rows: &Range<usize>, channel: Channel, bound: f64
                 && spread(&|i| usual.expected.at(r, i)) > bound
         }
         Channel::Stroke if spread(&|i| r.pressure[i]) > RAMPS * usual.spans[0] => {
-            let scale = held_scale(r, rows.clone().step_by(stride), usual);
-            let force = |i: usize| usual.expected.residual(r, i) + usual.expected.at(r, i);
+            let force = |i: usize| r.force.as_ref().map_or(0.0, |f| f[i]);
+            let points: Vec<(f64, f64)> =
+                rows.clone().step_by(stride).map(|i| (usual.expected.at(r, i), force(i))).collect();
+            let scale = held_scale(&points);
             let left = spread(&|i| force(i) - scale * usual.expected.at(r, i));
             left > bound.max(HELD_LEAVES * spread(&force))
         }
@@ -177,10 +179,9 @@ fn contradicted(r: &Recording, rows: &Range<usize>, channel: Channel, bound: f64
     }
 }
 
-/// By how much the force at these rows changes for each newton of the expected force, within what a held length allows.
-fn held_scale(r: &Recording, rows: impl Iterator<Item = usize>, usual: &Usual) -> f64 {
-    let at = |i: usize| (usual.expected.at(r, i), usual.expected.at(r, i) + usual.expected.residual(r, i));
-    let points: Vec<(f64, f64)> = rows.map(at).collect();
+/// By how much the force changes for each newton of the expected force, over pairs of expected and read force, within what a held length
+/// allows.
+fn held_scale(points: &[(f64, f64)]) -> f64 {
     let count = points.len().max(1) as f64;
     let (expected, force) = points.iter().fold((0.0, 0.0), |(e, f), p| (e + p.0 / count, f + p.1 / count));
     let (cross, square) = points
