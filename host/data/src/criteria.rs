@@ -2,7 +2,8 @@
 //!
 //! The macro [`criteria!`](crate::criteria!) declares the criteria of one stage as constants and as rows of the page that
 //! `cargo run -p pam-diagnose --example criteria` prints. No setting of a running program can change them. Only a program built with
-//! `--cfg pam_study`, for a study of how much the answers depend on each criterion, reads one factor from its environment:
+//! `--cfg pam_study`, for a study of how much the answers depend on each criterion, reads from its environment which criteria it scales,
+//! separated by commas, and the factor:
 //!
 //! ```text
 //! RUSTFLAGS='--cfg pam_study' cargo build --release -p host --target-dir STUDY

@@ -26,8 +26,9 @@ use crate::console::Console;
 use crate::demo::campaign::muscle;
 use crate::demo::tracking::{Law, Task, choose, track};
 
-/// Most ticks without a host that the firmware's settings allow.
+/// Most ticks without a host that the firmware's settings allow while a mode runs, and while the device is armed.
 const LONGEST_SILENCE: u32 = 60_000;
+const LONGEST_ARMED_SILENCE: u32 = 3_600_000;
 
 /// Time beyond the silence of a host until its fault shows.
 const MARGIN: Duration = Duration::from_secs(2);
@@ -97,8 +98,9 @@ fn not_emulated(axis: RigAxis) -> Option<&'static str> {
 pub(crate) fn allow_silence(client: &mut Client, speed: f64) -> Result<()> {
     let mut settings = client.call::<GetSettings>(&())?;
     let faster = (4.0 * speed).ceil().max(1.0) as u32;
-    settings.watch.host_silence_ticks =
-        settings.watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
+    let watch = &mut settings.watch;
+    watch.host_silence_ticks = watch.host_silence_ticks.saturating_mul(faster).min(LONGEST_SILENCE);
+    watch.armed_silence_ticks = watch.armed_silence_ticks.saturating_mul(faster).min(LONGEST_ARMED_SILENCE);
     client.call_once::<SetSettings>(&settings).map(drop)
 }
 

@@ -292,7 +292,7 @@ fn to_text(
 
 /// The residuals at the contractions and in the recordings of each muscle, under a heading; empty where no muscle has any to list.
 fn where_it_is(cases: &[Case], lengths: &[Option<LengthTransfer>]) -> String {
-    let mut text = String::new();
+    let (mut text, mut legend) = (String::new(), "");
     for (case, length) in cases.iter().zip(lengths) {
         let mut listed = String::new();
         if let Some(held) = &case.runs {
@@ -303,6 +303,9 @@ fn where_it_is(cases: &[Case], lengths: &[Option<LengthTransfer>]) -> String {
         }
         if let Some(length) = length {
             listed += &places("length of", &length.spots);
+        }
+        if !listed.is_empty() {
+            legend = ", at contractions (filling or shortening / emptying or lengthening)";
         }
         if let Some(held) = &case.runs {
             let table = recording_table(&held.recordings);
@@ -317,8 +320,7 @@ fn where_it_is(cases: &[Case], lengths: &[Option<LengthTransfer>]) -> String {
     if text.is_empty() {
         return text;
     }
-    "\nWhere the error is: mean of F − F_model, N, at contractions (filling or shortening / emptying or lengthening)\n".to_owned()
-        + &text
+    format!("\nWhere the error is: mean of F − F_model, N{legend}\n{text}")
 }
 
 /// The errors with the stock, one line for each muscle. Behind each: the mean error that unknown lengths, zeros and scale alone would give.

@@ -18,7 +18,7 @@ pub(super) fn positive<const N: usize>(options: [(&str, Option<f64>); N]) -> Res
         {
             return Err(Error::new(DataCode::CallInvalid, format!("{option} must be above zero"))
                 .value(value.to_string())
-                .help("omit the option to record at the rate of the controller until Ctrl-C"));
+                .help("write a number above zero, or omit the option"));
         }
     }
     Ok(())

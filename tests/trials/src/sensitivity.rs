@@ -1,7 +1,12 @@
 //! How much the answers depend on each criterion: the trials of a development set, answered with one criterion scaled at a time.
 //!
 //! A release has its criteria as constants. The study builds the program once with `--cfg pam_study`, in which each run can scale one of
-//! them (see `pam_data::criteria`). A study is continued where an earlier run stopped; the page lists what has not been measured, too.
+//! or several of them (see `pam_data::criteria`). A study is continued where an earlier run stopped; the page lists what has not been
+//! measured, too.
+//!
+//! Few criteria change an answer. The study therefore screens them in groups (Dorfman 1943, doi:10.1214/aoms/1177731363): all criteria of
+//! a group are scaled together, and a group that changes no answer is done. A group that changes one is halved until the criteria are
+//! found that change an answer alone.
 
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -28,7 +33,7 @@ pub struct Study {
     /// Where to.
     #[arg(short, long)]
     output: PathBuf,
-    /// These criteria only, in this order; all that decide a verdict otherwise.
+    /// These criteria only, in this order, each alone; all that decide a verdict otherwise, in groups.
     #[arg(long, value_name = "NAME")]
     criterion: Vec<String>,
     /// Longest time for one answer, s.
@@ -41,12 +46,16 @@ pub struct Study {
     #[arg(long)]
     minutes: Option<f64>,
     /// Write the table as this page of the book, too.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "criterion")]
     page: Option<PathBuf>,
 }
 
 /// Each criterion at half and at double its value.
 const FACTORS: [f64; 2] = [0.5, 2.0];
+
+/// Criteria that are scaled together at first. About one in fifteen changes an answer; groups of about the square root of that cost least
+/// (Dorfman), and halving them again favours somewhat larger ones.
+const GROUP: usize = 8;
 
 /// Stages whose criteria loops of the virtual bench do not reach: comparisons with a reference, campaigns over months, isometric
 /// runs, proposals of recordings, the health of a table on a controller, stocks of muscles.
@@ -97,8 +106,13 @@ impl Row {
     }
 }
 
-fn folder(criterion: &str, factor: f64) -> String {
-    format!("{criterion}@{factor}")
+/// The folder of a run: its first criterion, and how many follow.
+fn folder(group: &[String], factor: f64) -> String {
+    match group {
+        [] => "nominal".into(),
+        [only] => format!("{only}@{factor}"),
+        [first, others @ ..] => format!("{first}+{}@{factor}", others.len()),
+    }
 }
 
 /// Whether a factor is applied to it, and the trials can tell.
@@ -128,11 +142,11 @@ fn build(output: &Path) -> Result<PathBuf, Box<dyn Error>> {
     Ok(target.join("release/host"))
 }
 
-/// The environment in which the study's program scales one criterion. Its threads are left to the trials beside it.
-fn environment(criterion: &str, factor: f64) -> Vec<(&'static str, String)> {
+/// The environment in which the study's program scales criteria. Its threads are left to the trials beside it.
+fn environment(group: &[String], factor: f64) -> Vec<(&'static str, String)> {
     let mut all = vec![("RAYON_NUM_THREADS", "1".to_owned())];
-    if factor != 1.0 {
-        all.push(("PAM_CRITERION", criterion.to_owned()));
+    if !group.is_empty() {
+        all.push(("PAM_CRITERION", group.join(",")));
         all.push(("PAM_CRITERION_FACTOR", factor.to_string()));
     }
     all
@@ -170,31 +184,77 @@ fn outcomes(dir: &Path) -> Result<Vec<Outcome>, Box<dyn Error>> {
         .collect()
 }
 
-/// One row of the table; read again where it has been measured.
-fn measure(study: &Study, host: &Path, criterion: &str, factor: f64) -> Result<Row, Box<dyn Error>> {
-    let dir = study.output.join(folder(criterion, factor));
-    let kept = dir.join("row.json");
-    if let Ok(text) = std::fs::read_to_string(&kept) {
-        return Ok(serde_json::from_str(&text)?);
+/// The rows that have been measured, and what has not been for lack of time.
+struct Measurements<'a> {
+    study: &'a Study,
+    host: PathBuf,
+    until: Option<Instant>,
+}
+
+impl Measurements<'_> {
+    /// The answers with a group of criteria scaled; read again where they have been measured. None where the time is over.
+    fn row(&self, group: &[String], factor: f64) -> Result<Option<Row>, Box<dyn Error>> {
+        let dir = self.study.output.join(folder(group, factor));
+        let label = if group.is_empty() { "nominal".to_owned() } else { group.join(",") };
+        let kept = dir.join("row.json");
+        if let Ok(text) = std::fs::read_to_string(&kept) {
+            let row: Row = serde_json::from_str(&text)?;
+            if row.criterion != label {
+                return Err(format!(
+                    "{} holds other criteria: choose another output directory",
+                    dir.display()
+                )
+                .into());
+            }
+            return Ok(Some(row));
+        }
+        if self.until.is_some_and(|t| Instant::now() > t) {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        share(&self.study.set, &dir)?;
+        if ledger::read_ledger(&dir)?.answers.is_empty() {
+            let limit = Duration::from_secs(self.study.limit);
+            let environment = environment(group, factor);
+            answer::ask(
+                &dir,
+                &Asking { host: self.host.clone(), limit, until: None, tables: false, environment },
+            )?;
+        }
+        let row = Row::of(&label, factor, &outcomes(&dir)?);
+        std::fs::write(&kept, serde_json::to_string_pretty(&row)?)?;
+        println!(
+            "{label} × {factor}: false alarms {} of {}, class right {} of {} ({:.0} s)",
+            row.false_alarms,
+            row.nulls,
+            row.class_right,
+            row.judged,
+            start.elapsed().as_secs_f64()
+        );
+        Ok(Some(row))
     }
-    let start = Instant::now();
-    share(&study.set, &dir)?;
-    let limit = Duration::from_secs(study.limit);
-    if ledger::read_ledger(&dir)?.answers.is_empty() {
-        let environment = environment(criterion, factor);
-        answer::ask(&dir, &Asking { host: host.to_owned(), limit, until: None, tables: false, environment })?;
+
+    /// A row for each criterion of a group. Where the group together changes no answer, each has the answers of the nominal row. None
+    /// for what has not been measured.
+    fn screen(
+        &self,
+        nominal: &Row,
+        group: &[String],
+        factor: f64,
+    ) -> Result<Vec<Option<Row>>, Box<dyn Error>> {
+        let alone = |name: &String, row: &Row| Row { criterion: name.clone(), factor, ..row.clone() };
+        let Some(together) = self.row(group, factor)? else { return Ok(vec![None; group.len()]) };
+        if together.changed(nominal) == 0 {
+            return Ok(group.iter().map(|name| Some(alone(name, nominal))).collect());
+        }
+        if group.len() == 1 {
+            return Ok(vec![Some(together)]);
+        }
+        let (first, second) = group.split_at(group.len() / 2);
+        let mut rows = self.screen(nominal, first, factor)?;
+        rows.extend(self.screen(nominal, second, factor)?);
+        Ok(rows)
     }
-    let row = Row::of(criterion, factor, &outcomes(&dir)?);
-    std::fs::write(&kept, serde_json::to_string_pretty(&row)?)?;
-    println!(
-        "{criterion} × {factor}: false alarms {} of {}, class right {} of {} ({:.0} s)",
-        row.false_alarms,
-        row.nulls,
-        row.class_right,
-        row.judged,
-        start.elapsed().as_secs_f64()
-    );
-    Ok(row)
 }
 
 fn known(names: &[String]) -> Result<(), Box<dyn Error>> {
@@ -224,7 +284,9 @@ fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
          cargo run --release -p trials -- generate --set dev --n {} -o SET\n\
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
-         These commands wrote this page. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
+         These commands wrote this page. Criteria are scaled in groups of {GROUP} at first. Where a group changes no answer, none of its \
+         criteria is counted as changing one; this overlooks two that cancel each other. Where it changes one, the group is halved until \
+         the criteria are found that change an answer alone. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
          on each of them, not how good they are.\n\n",
         nominal.named.len()
     );
@@ -282,22 +344,28 @@ pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
     let until = study.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
     std::fs::create_dir_all(&study.output)?;
     let host = study.host.clone().map_or_else(|| build(&study.output), Ok)?;
-    let nominal = measure(study, &host, "nominal", 1.0)?;
-    if ledger::read_ledger(&study.output.join(folder("nominal", 1.0)))?.tool != answer::version(&host) {
+    let measurements = Measurements { study, host, until: None };
+    let nominal =
+        measurements.row(&[], 1.0)?.ok_or("the answers with the criteria as they are were not measured")?;
+    let begun_with = ledger::read_ledger(&study.output.join(folder(&[], 1.0)))?.tool;
+    if begun_with != answer::version(&measurements.host) {
         return Err("this study was begun with another program; name that one with --host, or choose another output directory".into());
     }
-    let mut wanted = study.criterion.clone();
-    let rest = all_that_decide();
-    wanted.extend(rest.into_iter().filter(|n| !study.criterion.contains(n)));
+    let measurements = Measurements { until, ..measurements };
+    let (names, size) = match study.criterion.as_slice() {
+        [] => (all_that_decide(), GROUP),
+        some => (some.to_vec(), 1),
+    };
     let (mut rows, mut open) = (Vec::new(), Vec::new());
-    for (i, name) in wanted.iter().enumerate() {
-        let asked = study.criterion.is_empty() || i < study.criterion.len();
-        let measured = FACTORS.iter().all(|f| study.output.join(folder(name, *f)).join("row.json").exists());
-        if !measured && (!asked || until.is_some_and(|t| Instant::now() > t)) {
-            open.push(name.clone());
-            continue;
+    for group in names.chunks(size) {
+        let half = measurements.screen(&nominal, group, FACTORS[0])?;
+        let double = measurements.screen(&nominal, group, FACTORS[1])?;
+        for ((name, half), double) in group.iter().zip(half).zip(double) {
+            match (half, double) {
+                (Some(half), Some(double)) => rows.push((half, double)),
+                _ => open.push(name.clone()),
+            }
         }
-        rows.push((measure(study, &host, name, FACTORS[0])?, measure(study, &host, name, FACTORS[1])?));
     }
     let page = markdown(&nominal, &rows, &open);
     std::fs::write(study.output.join("sensitivity.md"), &page)?;
@@ -320,9 +388,8 @@ mod tests {
         assert!(known(&["FAMILY_BETA".into()]).is_err());
     }
 
-    #[test]
-    fn the_page_counts_changed_answers_and_lists_what_is_open() {
-        let row = |criterion: &str, factor, named: [&str; 2]| Row {
+    fn row(criterion: &str, factor: f64, named: [&str; 2]) -> Row {
+        Row {
             criterion: criterion.into(),
             factor,
             false_alarms: 0,
@@ -333,7 +400,49 @@ mod tests {
             wrong_class: 0,
             unanswered: 0,
             named: named.iter().map(|n| vec![(*n).to_owned()]).collect(),
+        }
+    }
+
+    #[test]
+    fn a_group_that_changes_an_answer_is_halved_until_one_criterion_does() {
+        let output = std::env::temp_dir().join(format!("sensitivity-{}", std::process::id()));
+        let study = Study {
+            set: PathBuf::new(),
+            output: output.clone(),
+            criterion: Vec::new(),
+            limit: 1,
+            host: None,
+            minutes: None,
+            page: None,
         };
+        let nominal = row("nominal", 1.0, ["leak", "inertia"]);
+        let names: Vec<String> = ["A", "B", "C", "D", "E", "F"].map(String::from).to_vec();
+        let measured = |group: &[String], named| {
+            let dir = study.output.join(folder(group, 2.0));
+            std::fs::create_dir_all(&dir).unwrap();
+            let text = serde_json::to_string(&row(&group.join(","), 2.0, named)).unwrap();
+            std::fs::write(dir.join("row.json"), text).unwrap();
+        };
+        let changed = ["leak", "backlash"];
+        measured(&names[..4], changed);
+        measured(&names[..2], ["leak", "inertia"]);
+        measured(&names[2..4], changed);
+        measured(&names[2..3], changed);
+        // D and the group of E and F have not been measured, and the time is over.
+        let measurements = Measurements { study: &study, host: PathBuf::new(), until: Some(Instant::now()) };
+        let mut rows = measurements.screen(&nominal, &names[..4], 2.0).unwrap();
+        rows.extend(measurements.screen(&nominal, &names[4..], 2.0).unwrap());
+        let found: Vec<_> =
+            rows.iter().map(|r| r.as_ref().map(|r| (r.criterion.as_str(), r.changed(&nominal)))).collect();
+        assert_eq!(found, [Some(("A", 0)), Some(("B", 0)), Some(("C", 1)), None, None, None]);
+        // Another grouping in the same directory is an error, and not read as this one.
+        let others: Vec<String> = ["A", "C", "D", "E"].map(String::from).to_vec();
+        assert!(measurements.screen(&nominal, &others, 2.0).is_err());
+        std::fs::remove_dir_all(output).unwrap();
+    }
+
+    #[test]
+    fn the_page_counts_changed_answers_and_lists_what_is_open() {
         let nominal = row("nominal", 1.0, ["leak", "inertia"]);
         let rows = [
             (row("ALPHA", 0.5, ["leak", "backlash"]), row("ALPHA", 2.0, ["leak", "inertia"])),

@@ -2,9 +2,9 @@
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-/// The factor for a criterion, from the environment of the study's program.
+/// The factor for a criterion, from the environment of the study's program: for one criterion, or for several separated by commas.
 fn factor(criterion: &str) -> Option<f64> {
-    if std::env::var("PAM_CRITERION").ok()? != criterion {
+    if !std::env::var("PAM_CRITERION").ok()?.split(',').any(|name| name == criterion) {
         return None;
     }
     let text = std::env::var("PAM_CRITERION_FACTOR").unwrap_or_default();
