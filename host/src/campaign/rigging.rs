@@ -194,3 +194,26 @@ pub(crate) fn tracked(rigging: &mut Rigging, table: &TableFile) -> Result<Vec<(&
     }
     Ok(told)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Both times are counted in device time: one that did not follow disarmed the controller between two requests.
+    #[test]
+    fn a_fast_controller_allows_its_host_as_much_silence_as_a_real_one() {
+        let bench = BenchSpec::laboratory(muscle("mini").unwrap(), 1);
+        let emulated =
+            Emulated::start(Stand::commanded(bench, Axis::default()), Some(Kind::Native), 10.0).unwrap();
+        let mut client = Client::open(emulated.address()).unwrap();
+        let before = client.call::<GetSettings>(&()).unwrap().watch;
+        allow_silence(&mut client, 10.0).unwrap();
+        let after = client.call::<GetSettings>(&()).unwrap().watch;
+        assert_eq!(after.host_silence_ticks, 40 * before.host_silence_ticks);
+        assert_eq!(after.armed_silence_ticks, 40 * before.armed_silence_ticks);
+        allow_silence(&mut client, 1e6).unwrap();
+        let most = client.call::<GetSettings>(&()).unwrap().watch;
+        assert_eq!(most.host_silence_ticks, LONGEST_SILENCE);
+        assert_eq!(most.armed_silence_ticks, LONGEST_ARMED_SILENCE);
+    }
+}

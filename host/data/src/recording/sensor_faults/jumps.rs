@@ -1,6 +1,9 @@
 //! Drop-outs: the reading steps away within one row and back within one row, and no other reading steps. A step of the pressure must change
 //! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes of pressure and stroke are found
 //! by the same, and single zeros of the force; its other spikes are outliers of a fit.
+//!
+//! A muscle at rest between two strokes is no drop-out of the force: near its full length a small stroke changes the force much. Its
+//! force comes and goes as fast as in the rows beside, or with a stroke or pressure that steps away and back, too.
 
 use std::ops::Range;
 
@@ -14,6 +17,10 @@ const STEP: (f64, f64) = (0.06, 12.0);
 const STEADY: f64 = 0.25;
 /// The other columns change by less than this share of their range over the row of a step.
 const OTHERS: f64 = 0.05;
+/// A force steps this many times as far as it changes over the row before and the row after.
+const SUDDEN: f64 = 2.0;
+/// A stroke or pressure stands still between two steps where each of them is this many times its largest change over a row between.
+const STANDS: f64 = 3.0;
 /// What lasts longer, s, is how the bench was driven.
 const LONGEST: f64 = 10.0;
 
@@ -80,8 +87,23 @@ fn is_away(r: &Recording, channel: Channel, rows: Range<usize>, usual: &Usual) -
         Channel::Force => {
             let (force, expected) = (channel.of(r), usual.expected.at(r, rows.start));
             (force[rows.start] - expected).abs() > (force[rows.start - 1] - expected).abs()
+                && is_sudden(force, &rows)
+                && ![Channel::Pressure, Channel::Stroke].iter().any(|c| rests(c.of(r), &rows))
         }
     }
+}
+
+/// Whether the steps at both ends are larger than the changes over the rows beside them.
+fn is_sudden(force: &[f64], rows: &Range<usize>) -> bool {
+    let change = |i: usize| if 0 < i && i < force.len() { (force[i] - force[i - 1]).abs() } else { 0.0 };
+    change(rows.start) > SUDDEN * change(rows.start - 1) && change(rows.end) > SUDDEN * change(rows.end + 1)
+}
+
+/// Whether a column steps away before these rows, stands still in them, and steps back after them.
+fn rests(column: &[f64], rows: &Range<usize>) -> bool {
+    let (away, back) = (column[rows.start] - column[rows.start - 1], column[rows.end] - column[rows.end - 1]);
+    let between = column[rows.clone()].windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    away * back < 0.0 && away.abs().min(back.abs()) > STANDS * between
 }
 
 /// Whether the force stays while the reading of pressure or stroke is away, though the expected force does not.

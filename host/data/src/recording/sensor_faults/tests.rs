@@ -109,6 +109,48 @@ fn a_pressure_ramp_at_held_length_has_no_frozen_stroke() {
     }
 }
 
+/// Short rests at full length between strokes, one row of which changes the force by a tenth of its range. A drop-out of the same force
+/// while the muscle moves is still found.
+#[test]
+fn a_short_rest_at_full_length_is_no_drop_out_of_the_force() {
+    let stroke_of = |i: usize, ramp: bool| {
+        let k = i % 80;
+        match (k, ramp) {
+            (0..13, _) => 0.0,
+            // One row of stroke, as an axis makes that approaches in steps.
+            (_, false) => 0.12e-3,
+            (13..46, true) => 0.09e-3 * (k - 12) as f64,
+            (_, true) => 0.09e-3 * (79 - k) as f64,
+        }
+    };
+    for (seed, ramp) in (0..10).flat_map(|seed| [(seed, true), (seed, false)]) {
+        let mut campaign = campaign(seed);
+        let rows = 800;
+        let noise = |i: usize| (i * 7919 % 13) as f64 / 13.0 - 0.5;
+        let stroke: Vec<f64> = (0..rows).map(|i| stroke_of(i, ramp) + 0.4e-6 * noise(i)).collect();
+        let steep = |x: f64| 16.0 * (-x / 0.12e-3).exp();
+        let force = |i: usize| {
+            (345e3 - 70e3) * 2.9e-4 * (1.0 - 130.0 * stroke[i]) + steep(stroke[i]) + 0.2 * noise(i)
+        };
+        campaign.recordings.push(Recording {
+            name: "fast".into(),
+            time: (0..rows).map(|i| 0.1 * i as f64).collect(),
+            force: Some((0..rows).map(force).collect()),
+            pressure: (0..rows).map(|i| 345e3 + 300.0 * noise(i)).collect(),
+            stroke: stroke.clone(),
+            ..Recording::default()
+        });
+        assert_eq!(faults(&campaign), [], "seed {seed}, ramp {ramp}");
+        if let (true, Some(force)) = (ramp, campaign.recordings[6].force.as_mut()) {
+            force[105..118].fill(2.0);
+        }
+        let found = faults(&campaign);
+        let kinds: Vec<_> = found.iter().map(|f| (f.recording, f.channel, f.kind)).collect();
+        let expected: &[_] = if ramp { &[(6, Channel::Force, Kind::DropOut)] } else { &[] };
+        assert_eq!(kinds, expected, "seed {seed}, ramp {ramp}");
+    }
+}
+
 #[test]
 fn a_force_that_is_cut_in_one_file_is_found() {
     let found = faults(&spoiled(3, Channel::Force, |c| c.iter_mut().for_each(|f| *f = f.min(40.0))));
