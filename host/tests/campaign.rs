@@ -131,3 +131,19 @@ fn a_rig_that_the_virtual_bench_does_not_have_is_refused() {
     let said = String::from_utf8_lossy(&made.stderr).into_owned();
     assert!(said.contains("no hanging weight"), "{said}");
 }
+
+/// Setpoints arrive too late then, and steps are recorded in vain.
+#[test]
+fn a_speed_that_the_program_cannot_follow_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(["campaign", "--emulate", "mini", "--speed", "200", "-o"])
+        .arg(folder.path().join("c"))
+        .env("XDG_CONFIG_HOME", folder.path())
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&made.stderr);
+    assert_eq!(made.status.code(), Some(2), "{message}");
+    assert!(message.contains("--speed is at most 100"), "{message}");
+    assert!(!folder.path().join("c").exists());
+}
