@@ -16,7 +16,7 @@ use crate::bench::VirtualBench;
 use crate::course::Course;
 use crate::criteria::{REPEATS, TOP_SHARE};
 use crate::engine::{Decision, Engine};
-use crate::journal::{Chosen, Event, Journal, unix_seconds};
+use crate::journal::{Chosen, Completion, Event, Journal, unix_seconds};
 use crate::step::{CheckKind, Step};
 use crate::watch::{Limits, Spoiled, Watch};
 
@@ -253,13 +253,13 @@ fn one_step(
         let attempt = attempt(actuation, sink, observer, &course, &mut watch);
         let end_s = actuation.clock();
         if !matches!(attempt, Ok(Attempt::Whole)) {
-            let (file, rows) = sink.finish("_cut", watch.rows())?;
+            let (file, rows) = sink.finish(Completion::Cut, watch.rows())?;
             sink.event(Event::Cut { number: chosen.number, file, rows })?;
             return attempt.map(|_| None);
         }
         match watch.judge(&chosen.step) {
             None => {
-                let (file, rows) = sink.finish("", watch.rows())?;
+                let (file, rows) = sink.finish(Completion::Whole, watch.rows())?;
                 sink.event(Event::Recorded {
                     number: chosen.number,
                     file: file.clone(),
@@ -274,7 +274,7 @@ fn one_step(
                 return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, told }));
             }
             Some(reason) => {
-                let (file, rows) = sink.finish("_spoiled", watch.rows())?;
+                let (file, rows) = sink.finish(Completion::Spoiled, watch.rows())?;
                 sink.event(Event::Spoiled {
                     number: chosen.number,
                     file: file.clone(),

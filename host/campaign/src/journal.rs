@@ -3,6 +3,7 @@
 //!
 //! `journal.jsonl` has one event per line and is synchronised with the disk after each. Rows go to `NN_NAME.csv.part`, synchronised piece by
 //! piece; the file gets its name when the step is complete. After an interruption the whole rows of a `.part` become `NN_NAME_cut.csv`.
+//! A spoiled recording is named `NN_NAME.csv.spoiled`: `*.csv` names what a fit or a diagnosis may read.
 
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
@@ -23,6 +24,20 @@ pub const JOURNAL: &str = "journal.jsonl";
 const PIECE: Duration = Duration::from_millis(200);
 /// Columns of every recording.
 const HEADER: &str = "time_s,pressure_kPa,displacement_mm,force_N,pressure_command_kPa\n";
+
+/// End of the name of a spoiled recording.
+const SPOILED: &str = ".csv.spoiled";
+
+/// How the recording of a step ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Completion {
+    /// As planned.
+    Whole,
+    /// Interrupted: its rows are fitted like others.
+    Cut,
+    /// Spoiled: it is kept and not fitted.
+    Spoiled,
+}
 
 /// Why a step was chosen and what was expected of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -247,14 +262,14 @@ impl Journal {
         if part.synced.elapsed() >= PIECE { part.sync() } else { Ok(()) }
     }
 
-    /// Ends the recording of a step: `suffix` marks a spoiled one. Returns the file's name and its rows.
+    /// Ends the recording of a step. Returns the file's name and its rows.
     ///
     /// # Errors
     /// [`DataCode::FileUnwritable`].
-    pub fn finish(&mut self, suffix: &str) -> Result<(String, u64)> {
+    pub fn finish(&mut self, completion: Completion) -> Result<(String, u64)> {
         let Some(mut part) = self.part.take() else { return Ok((String::new(), 0)) };
         part.sync()?;
-        let file = free_name(&self.folder, &format!("{}{suffix}", part.name));
+        let file = free_name(&self.folder, &part.name, completion);
         let to = self.folder.join(&file);
         std::fs::rename(&part.path, &to).map_err(unwritable(&to))?;
         Ok((file, part.rows))
@@ -312,11 +327,12 @@ impl Journal {
             let Some(name) = path.file_name().and_then(|n| n.to_str()).map(str::to_owned) else { continue };
             let number: Option<u32> = name.split('_').next().and_then(|n| n.parse().ok());
             let Some(number) = number else { continue };
-            if let Some(base) = name.strip_suffix(".csv.part") {
+            let spoiled = name.strip_suffix(SPOILED).filter(|_| !self.names(&name));
+            if let Some(base) = name.strip_suffix(".csv.part").or(spoiled) {
                 let text = std::fs::read_to_string(&path).map_err(|e| Error::unreadable(&path, &e))?;
                 let whole = text.rfind('\n').map_or("", |i| &text[..=i]);
                 let rows = whole.lines().count().saturating_sub(1) as u64;
-                let file = free_name(&folder, &format!("{base}_cut"));
+                let file = free_name(&folder, base, Completion::Cut);
                 let to = folder.join(&file);
                 std::fs::write(&path, whole)
                     .and_then(|()| std::fs::rename(&path, &to))
@@ -354,12 +370,17 @@ impl Part {
 }
 
 /// A name in the folder that no file has.
-fn free_name(folder: &Path, base: &str) -> String {
-    let plain = format!("{base}.csv");
+fn free_name(folder: &Path, name: &str, completion: Completion) -> String {
+    let (mark, extension) = match completion {
+        Completion::Whole => ("", ".csv"),
+        Completion::Cut => ("_cut", ".csv"),
+        Completion::Spoiled => ("", SPOILED),
+    };
+    let plain = format!("{name}{mark}{extension}");
     if !folder.join(&plain).exists() {
         return plain;
     }
-    (2..).map(|n| format!("{base}_{n}.csv")).find(|n| !folder.join(n).exists()).unwrap_or(plain)
+    (2..).map(|n| format!("{name}{mark}_{n}{extension}")).find(|n| !folder.join(n).exists()).unwrap_or(plain)
 }
 
 /// Seconds since 1970.
@@ -407,13 +428,39 @@ mod tests {
         assert_eq!(journal.clock(), Some(4.0), "what follows comes after the rows of the interrupted step");
         journal.begin(1, "tare").unwrap();
         journal.row(&reading(9.0)).unwrap();
-        let (file, rows) = journal.finish("").unwrap();
+        let (file, rows) = journal.finish(Completion::Whole).unwrap();
         assert_eq!((file.as_str(), rows), ("01_tare.csv", 1));
         drop(journal);
         // Named, and not in the log yet: the next program finds it.
         let journal = Journal::open(folder.path()).unwrap();
         assert_eq!(journal.recordings().len(), 2);
         assert_eq!(journal.events().len(), 2);
+    }
+
+    /// `*.csv` in the folder names what a fit may read.
+    #[test]
+    fn a_spoiled_recording_is_no_csv_file_and_its_rows_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = Journal::open(folder.path()).unwrap();
+        let spoil = |journal: &mut Journal, time| {
+            journal.begin(1, "tare").unwrap();
+            journal.row(&reading(time)).unwrap();
+            journal.finish(Completion::Spoiled).unwrap().0
+        };
+        let (reason, end_s) = (crate::watch::Spoiled::Slack, 1.0);
+        let file = spoil(&mut journal, 0.0);
+        assert_eq!(file, "01_tare.csv.spoiled");
+        journal.write(Event::Spoiled { number: 1, file, rows: 1, reason, end_s }).unwrap();
+        assert_eq!(spoil(&mut journal, 2.0), "01_tare_2.csv.spoiled");
+        drop(journal);
+        // The second one is not in the log: its rows are those of an interrupted step.
+        let journal = Journal::open(folder.path()).unwrap();
+        assert_eq!(journal.recordings().len(), 1);
+        assert!(
+            folder.path().join("01_tare_2_cut.csv").exists()
+                && folder.path().join("01_tare.csv.spoiled").exists()
+        );
+        assert!(!folder.path().join("01_tare_2.csv.spoiled").exists());
     }
 
     #[test]

@@ -222,8 +222,7 @@ impl Arguments {
             .filter_map(|f| Some(f.ok()?.path()))
             .filter(|p| {
                 let name = p.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                let check =
-                    CheckKind::ALL.iter().any(|c| name.contains(c.file())) || name.contains("_spoiled");
+                let check = CheckKind::ALL.iter().any(|c| name.contains(c.file()));
                 name.ends_with(".csv") && !check
             })
             .collect();

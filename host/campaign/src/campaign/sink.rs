@@ -9,13 +9,13 @@ use pam_data::recording::Recording;
 
 use super::{read, recording};
 use crate::actuation::Reading;
-use crate::journal::{Event, Journal};
+use crate::journal::{Completion, Event, Journal};
 
 /// Where rows and events go.
 pub(super) trait Sink {
     fn begin(&mut self, number: u32, name: &str) -> Result<()>;
     fn row(&mut self, reading: &Reading) -> Result<()>;
-    fn finish(&mut self, suffix: &str, rows: &[Reading]) -> Result<(String, u64)>;
+    fn finish(&mut self, completion: Completion, rows: &[Reading]) -> Result<(String, u64)>;
     fn event(&mut self, event: Event) -> Result<()>;
     fn recording(&self, file: &str, rows: &[Reading]) -> Result<Recording>;
     fn table(&mut self, name: &str, csv: &str) -> Result<Option<PathBuf>>;
@@ -36,8 +36,8 @@ impl Sink for OnDisk<'_> {
         self.journal.row(reading)
     }
 
-    fn finish(&mut self, suffix: &str, _rows: &[Reading]) -> Result<(String, u64)> {
-        self.journal.finish(suffix)
+    fn finish(&mut self, completion: Completion, _rows: &[Reading]) -> Result<(String, u64)> {
+        self.journal.finish(completion)
     }
 
     fn event(&mut self, event: Event) -> Result<()> {
@@ -69,8 +69,8 @@ impl Sink for InMemory<'_> {
         Ok(())
     }
 
-    fn finish(&mut self, suffix: &str, rows: &[Reading]) -> Result<(String, u64)> {
-        Ok((suffix.to_owned(), rows.len() as u64))
+    fn finish(&mut self, _completion: Completion, rows: &[Reading]) -> Result<(String, u64)> {
+        Ok((String::new(), rows.len() as u64))
     }
 
     fn event(&mut self, _event: Event) -> Result<()> {
