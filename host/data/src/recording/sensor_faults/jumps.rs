@@ -19,8 +19,8 @@ const STEADY: f64 = 0.25;
 const OTHERS: f64 = 0.05;
 /// A force steps this many times as far as it changes over the row before and the row after.
 const SUDDEN: f64 = 2.0;
-/// A stroke or pressure stands still between two steps where each of them is this many times its largest change over a row between.
-const STANDS: f64 = 3.0;
+/// A stroke or pressure rests between two steps where each of them is this many times its largest change over a row between.
+const RESTS: f64 = 3.0;
 /// What lasts longer, s, is how the bench was driven.
 const LONGEST: f64 = 10.0;
 
@@ -99,11 +99,11 @@ fn is_sudden(force: &[f64], rows: &Range<usize>) -> bool {
     change(rows.start) > SUDDEN * change(rows.start - 1) && change(rows.end) > SUDDEN * change(rows.end + 1)
 }
 
-/// Whether a column steps away before these rows, stands still in them, and steps back after them.
+/// Whether a column steps away before these rows, rests in them, and steps back after them.
 fn rests(column: &[f64], rows: &Range<usize>) -> bool {
     let (away, back) = (column[rows.start] - column[rows.start - 1], column[rows.end] - column[rows.end - 1]);
     let between = column[rows.clone()].windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-    away * back < 0.0 && away.abs().min(back.abs()) > STANDS * between
+    away * back < 0.0 && away.abs().min(back.abs()) > RESTS * between
 }
 
 /// Whether the force stays while the reading of pressure or stroke is away, though the expected force does not.
