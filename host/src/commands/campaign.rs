@@ -77,7 +77,8 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Most device seconds in a second. At 200, three of eight muscles of the virtual bench did not reach their pressure in time, at 100 none.
+/// Most device seconds in a second. At 200, three of eight muscles of the virtual bench did not reach their pressure in time; at 100 these
+/// three did.
 const FASTEST: f64 = 100.0;
 
 /// What recordings are for.

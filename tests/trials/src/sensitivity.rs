@@ -1,7 +1,7 @@
 //! How much the answers depend on each criterion: the trials of a development set, answered with one criterion scaled at a time.
 //!
-//! A release has its criteria as constants. The study builds the program once with `--cfg pam_study`, in which each run can scale one of
-//! or several of them (see `pam_data::criteria`). A study is continued where an earlier run stopped; the page lists what has not been
+//! A release has its criteria as constants. The study builds the program once with `--cfg pam_study`, in which each run can scale one or
+//! several of them (see `pam_data::criteria`). A study is continued where an earlier run stopped; the page lists what has not been
 //! measured, too.
 //!
 //! Few criteria change an answer. The study therefore screens them in groups (Dorfman 1943, doi:10.1214/aoms/1177731363): all criteria of
@@ -242,10 +242,10 @@ impl Measurements<'_> {
         group: &[String],
         factor: f64,
     ) -> Result<Vec<Option<Row>>, Box<dyn Error>> {
-        let alone = |name: &String, row: &Row| Row { criterion: name.clone(), factor, ..row.clone() };
         let Some(together) = self.row(group, factor)? else { return Ok(vec![None; group.len()]) };
         if together.changed(nominal) == 0 {
-            return Ok(group.iter().map(|name| Some(alone(name, nominal))).collect());
+            let unchanged = |name: &String| Row { criterion: name.clone(), factor, ..nominal.clone() };
+            return Ok(group.iter().map(|name| Some(unchanged(name))).collect());
         }
         if group.len() == 1 {
             return Ok(vec![Some(together)]);
