@@ -145,7 +145,9 @@ fn column(rows: &Rows, plan: &Plan, live: &[f64], at: &Iterate, factor: &[f64], 
         Part::Settling => {
             weighted_rows(w, |i| -live[i] * rows.sign[i] * quasi[i] * rows.at_rest().settling[i])
         }
-        Part::Unsettled | Part::Ramping => weighted_rows(w, |i| rubbing(i) * part.departure(rows, i)),
+        Part::Unsettled | Part::Ramping | Part::Turning(_) => {
+            weighted_rows(w, |i| rubbing(i) * part.departure(rows, i))
+        }
     };
     (0, whole)
 }
@@ -356,7 +358,7 @@ fn values_within(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64], withi
             }
             Part::Settling => settling = *c,
             Part::Rest(from, to) if to <= within.start || from >= within.end => {}
-            Part::Unsettled | Part::Rest(..) | Part::Ramping => {
+            Part::Unsettled | Part::Rest(..) | Part::Ramping | Part::Turning(_) => {
                 departure
                     .iter_mut()
                     .enumerate()

@@ -18,6 +18,7 @@ use super::criteria::rest_friction::{
 use super::remark;
 use super::rows::{RestFriction, Rows};
 
+mod held;
 mod ramps;
 mod steps;
 
@@ -163,9 +164,12 @@ pub(crate) fn settle_ramps(rows: &Rows) -> (Rows, Option<Turning>) {
 
 /// Finds the law of friction at rest: the rows with its directions, and the law; none where friction stays as the model holds it.
 pub(crate) fn settle_rest_friction(rows: &Rows) -> (Rows, Option<RestLaw>) {
+    if rows.isometric {
+        return held::settle(rows);
+    }
     let holds = holds(rows);
     let Some(moving) = moving(rows, &holds) else { return (rows.clone(), None) };
-    // Friction and bladder as the moving rows have them; of a muscle that was held throughout, as all rows have them.
+    // Friction and bladder as the moving rows have them.
     let fitted = baselines::fit(&moving, Kind::Flexible(TABLE_ORDER), &[]);
     let pressures: Vec<Vec<f64>> = PRESSURE_SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
     let stays: Vec<Vec<f64>> =
@@ -176,16 +180,12 @@ pub(crate) fn settle_rest_friction(rows: &Rows) -> (Rows, Option<RestLaw>) {
     };
     let law = (energy < REST_LAW_LEAVES * held).then_some(best);
     let chosen = law.map_or(stays, |law| directions(rows, &holds, &pressures, law));
-    let rest = if rows.isometric {
-        vec![0; rows.len()]
-    } else {
-        let doubted = match law {
-            Some(law) => matches!(law, RestLaw::Follows { .. }),
-            None => held > NO_LAW_RATIO * fitted.per_row(&moving) * weight_at(rows, &holds),
-        };
-        let steps = steps::of(rows, &fitted, &holds, &chosen);
-        rests(rows, &holds, &chosen, &steps, doubted)
+    let doubted = match law {
+        Some(law) => matches!(law, RestLaw::Follows { .. }),
+        None => held > NO_LAW_RATIO * fitted.per_row(&moving) * weight_at(rows, &holds),
     };
+    let steps = steps::of(rows, &fitted, &holds, &chosen);
+    let rest = rests(rows, &holds, &chosen, &steps, doubted);
     (settled(rows, &holds, &chosen, law, rest), law)
 }
 
@@ -193,11 +193,8 @@ pub(crate) fn settle_rest_friction(rows: &Rows) -> (Rows, Option<RestLaw>) {
 fn moving(rows: &Rows, holds: &[(usize, usize)]) -> Option<Rows> {
     let counts = rows.still.iter().zip(rows.root_weight());
     let resting = counts.filter(|(s, w)| **s > RESTING_AFTER && **w > 0.0).count();
-    if holds.is_empty() || !rows.isometric && resting * RESTING_ROWS < rows.effective() {
+    if holds.is_empty() || resting * RESTING_ROWS < rows.effective() {
         return None;
-    }
-    if rows.isometric {
-        return Some(rows.clone());
     }
     let mut at_rest = vec![false; rows.len()];
     for (from, to) in holds {
@@ -226,9 +223,8 @@ fn best_law(
             FOLLOWING_PRESSURES.iter().map(move |b| RestLaw::Follows { carries: *h, over: *b, smoothing })
         })
     };
-    // Of a muscle that was held throughout the direction comes from the pressure: there it is followed or not.
-    let first = SETTLING_TIMES.iter().filter(|_| !rows.isometric).map(|t| RestLaw::Fades(*t));
-    let mut best = best_of(first.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
+    let fades = SETTLING_TIMES.iter().map(|t| RestLaw::Fades(*t));
+    let mut best = best_of(fades.chain((0..PRESSURE_SMOOTHING.len()).flat_map(follows)).collect())?;
     for factors in NEARBY_FACTORS {
         best = best_of(nearby(best.0, &factors)).filter(|(_, e)| *e < best.1).unwrap_or(best);
     }
@@ -262,14 +258,13 @@ fn settled(
     rest: Vec<u32>,
 ) -> Rows {
     let n = rows.len();
-    let mut found = RestFriction { settling: vec![0.0; n], unsettled: vec![0.0; n], rest };
+    let mut found =
+        RestFriction { settling: vec![0.0; n], unsettled: vec![0.0; n], rest, turning: Vec::new() };
     let Some(law) = law else { return rows.with_rest_friction(found) };
     let mut contexts = rows.contexts().to_vec();
     for ((from, to), way) in holds.iter().zip(directions) {
         for i in (*from..*to).filter(|i| !rows.on_ramp[*i]) {
-            if !rows.isometric {
-                found.unsettled[i] = contexts[i].direction - way[i - from];
-            }
+            found.unsettled[i] = contexts[i].direction - way[i - from];
             contexts[i].direction = way[i - from];
             if let RestLaw::Fades(time) = law
                 && rows.still[i] > 0.0

@@ -78,6 +78,9 @@ pub(crate) struct RestFriction {
     pub unsettled: Vec<f64>,
     /// Number of the stretch of a hold over which friction rests at an unknown place in its gap; zero elsewhere.
     pub rest: Vec<u32>,
+    /// Where the length was held throughout: for each change of pressure over which a part of friction may turn, the direction of that part
+    /// less the one that friction was found to have. Empty elsewhere.
+    pub turning: Vec<Vec<f64>>,
 }
 
 /// What one bladder for all pressures may do near full contraction.
@@ -209,6 +212,7 @@ impl Rows {
             settling: pick(stride, &self.at_rest().settling),
             unsettled: pick(stride, &self.at_rest().unsettled),
             rest: pick(stride, &self.at_rest().rest),
+            turning: self.at_rest().turning.iter().map(|turned| pick(stride, turned)).collect(),
         };
         Self {
             recorded: Arc::new(recorded),
@@ -275,7 +279,12 @@ pub(crate) fn prepare_corrected(
         has_temperature: gathered.has_temperature,
         isometric,
     };
-    let stays = RestFriction { settling: vec![0.0; n], unsettled: vec![0.0; n], rest: vec![0; n] };
+    let stays = RestFriction {
+        settling: vec![0.0; n],
+        unsettled: vec![0.0; n],
+        rest: vec![0; n],
+        turning: Vec::new(),
+    };
     let rows = Rows {
         recorded: Arc::new(recorded),
         contexts: Arc::new(gathered.contexts),

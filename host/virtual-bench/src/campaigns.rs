@@ -172,24 +172,65 @@ pub fn upgraded(muscle: &Muscle, levels: &[f64], seed: u64) -> Protocol {
     Protocol { name: "D".into(), sample_hz: 10.0, step }
 }
 
-/// Pressure staircases up and down at three held lengths, as in the recordings of commercial muscles.
-pub fn staircase(muscle: &Muscle, levels: &[f64]) -> Protocol {
+/// Lengths at which muscles are held, as parts of the free stroke.
+const HELD: [f64; 3] = [0.0, 0.25, 0.5];
+
+/// For each held length what is recorded there, in a file of its own. The highest pressure comes first.
+fn held(
+    name: &str,
+    sample_hz: f64,
+    muscle: &Muscle,
+    levels: &[f64],
+    parts: &[f64],
+    there: impl Fn(f64) -> Vec<Step>,
+) -> Protocol {
     let (v, mut n) = (slow(muscle, levels), 0);
     let top = levels.iter().copied().fold(0.0, f64::max);
     let mut step = Vec::new();
-    for part in [0.0, 0.25, 0.5] {
-        step.extend([set(top, 1.0), go(part, 4.0 * v)]);
+    for part in parts {
+        step.extend([set(top, 1.0), go(*part, 4.0 * v)]);
         step.push(file(&mut n, &format!("held_{:02.0}percent", part * 100.0)));
-        let up: Vec<f64> = (0..=10).map(|i| top * f64::from(i) / 10.0).collect();
-        for &p in up.iter().chain(up.iter().rev().skip(1)) {
-            step.push(Step::Pressure { to_kpa: p * 1e-3, rate_kpa_s: None, settle_s: 6.0 });
-        }
+        step.extend(there(top));
         step.push(Step::EndFile);
     }
-    Protocol { name: "staircase".into(), sample_hz: 20.0, step }
+    Protocol { name: name.into(), sample_hz, step }
 }
 
-/// A protocol by name: `thesis`, `A`, `B`, `C`, `D` or `staircase`.
+/// Pressure staircases up and down at held lengths (parts of the free stroke), as in the recordings of commercial muscles.
+fn staircases(name: &str, muscle: &Muscle, levels: &[f64], parts: &[f64]) -> Protocol {
+    held(name, 20.0, muscle, levels, parts, |top| {
+        let up: Vec<f64> = (0..=10).map(|i| top * f64::from(i) / 10.0).collect();
+        let there_and_back = up.iter().chain(up.iter().rev().skip(1));
+        there_and_back
+            .map(|&p| Step::Pressure { to_kpa: p * 1e-3, rate_kpa_s: None, settle_s: 6.0 })
+            .collect()
+    })
+}
+
+/// Pressure staircases up and down at three held lengths.
+pub fn staircase(muscle: &Muscle, levels: &[f64]) -> Protocol {
+    staircases("staircase", muscle, levels, &HELD)
+}
+
+/// Pressure ramps at held lengths: at three rates over the whole range, then over parts of it, with a rest under pressure.
+fn held_ramps(name: &str, muscle: &Muscle, levels: &[f64], parts: &[f64]) -> Protocol {
+    held(name, 10.0, muscle, levels, parts, |top| {
+        let to = |part: f64, seconds: f64, settle_s: f64| Step::Pressure {
+            to_kpa: part * top * 1e-3,
+            rate_kpa_s: Some(top * 1e-3 / seconds),
+            settle_s,
+        };
+        let mut step = Vec::new();
+        for seconds in [25.0, 25.0, 10.0, 60.0] {
+            step.extend([to(0.0, seconds, 2.0), to(1.0, seconds, 2.0)]);
+        }
+        step.extend([0.3, 0.8, 0.5, 0.7].map(|part| to(part, 25.0, 2.0)));
+        step.extend([to(0.0, 25.0, 2.0), to(0.6, 25.0, 40.0), to(1.0, 25.0, 2.0)]);
+        step
+    })
+}
+
+/// A protocol by name: `thesis`, `A`, `B`, `C`, `D`, `staircase`; at one held length `one-staircase` and `one-ramps`, at three `ramps`.
 pub fn by_name(name: &str, muscle: &Muscle, levels: &[f64], seed: u64) -> Option<Protocol> {
     Some(match name {
         "thesis" => thesis(muscle, levels),
@@ -198,6 +239,9 @@ pub fn by_name(name: &str, muscle: &Muscle, levels: &[f64], seed: u64) -> Option
         "C" => complete(muscle, levels, seed),
         "D" => upgraded(muscle, levels, seed),
         "staircase" => staircase(muscle, levels),
+        "one-staircase" => staircases(name, muscle, levels, &HELD[..1]),
+        "one-ramps" => held_ramps(name, muscle, levels, &HELD[..1]),
+        "ramps" => held_ramps(name, muscle, levels, &HELD),
         _ => return None,
     })
 }

@@ -13,6 +13,7 @@ mod festo_tables;
 mod figures;
 mod fitted;
 mod generate;
+mod held;
 mod inject;
 mod ledger;
 mod limits;
@@ -215,6 +216,8 @@ enum Command {
     Sensitivity(sensitivity::Study),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
+    /// Diagnose muscles of the virtual bench whose length was held, clean ones and with one effect.
+    Held(held::Held),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
     /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
@@ -284,6 +287,7 @@ fn main() -> ExitCode {
         Command::Campaign(what) => campaign::run(&what),
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Sensors(what) => sensors::run(&what),
+        Command::Held(what) => held::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::ReferenceFurther(what) => reference::further::run(&what),
         Command::ReferenceBench(what) => {

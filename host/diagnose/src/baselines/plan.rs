@@ -45,6 +45,8 @@ pub(super) enum Part {
     Rest(usize, usize),
     /// How far friction reverses while the pressure ramps at held length, relative to a reversal of the stroke.
     Ramping,
+    /// A part of friction that turns over its own change of the pressure, where the length was held throughout.
+    Turning(usize),
 }
 
 impl Part {
@@ -53,6 +55,7 @@ impl Part {
         match self {
             Self::Unsettled => rows.at_rest().unsettled[i],
             Self::Rest(from, to) if (from..to).contains(&i) => 1.0,
+            Self::Turning(part) => rows.at_rest().turning[part][i],
             Self::Ramping if rows.on_ramp[i] => rows.sign[i],
             _ => 0.0,
         }
@@ -148,6 +151,7 @@ impl Plan {
         if rows.on_ramp.iter().any(|r| *r) {
             hard.push(Part::Ramping);
         }
+        hard.extend((0..rows.at_rest().turning.len()).map(Part::Turning));
         Self { hard, soft, functions }
     }
 }

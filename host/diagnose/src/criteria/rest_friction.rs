@@ -8,6 +8,10 @@ pam_data::criteria! {
     CARRIED_PRESSURES: ([f64; 8]) = [0.0, 500.0, 1.0e3, 1.5e3, 2.0e3, 2.6e3, 4.0e3, 7.0e3], "h", "Pa", Judgement;
     /// Changes of pressure over which friction reaches the other branch, tried.
     FOLLOWING_PRESSURES: ([f64; 7]) = [100.0, 300.0, 1.0e3, 3.0e3, 1.0e4, 3.0e4, 1.0e5], "b", "Pa", Derived("half decades");
+    /// Changes of pressure over which a part of friction turns in a muscle that was held throughout; the shares of the parts are fitted.
+    TURNING_PRESSURES: ([f64; 4]) = [3.0e3, 1.0e4, 3.0e4, 1.0e5], "b_k", "Pa", Derived("half decades, from a regulator's ripple to the range of most tests");
+    /// Of a muscle that was held throughout this many rows decide how friction follows the pressure.
+    HELD_ROWS: usize = 6000, "N_held", "1", Cost;
     /// Rows each way over which the pressure is smoothed, tried.
     PRESSURE_SMOOTHING: ([usize; 3]) = [0, 1, 3], "m_P", "1", Judgement;
     /// Factors by which the best law is varied, coarse and fine.

@@ -1,0 +1,75 @@
+//! A muscle whose length was held throughout, in pressure ramps: strands slip one after the other, so that friction turns over a wide
+//! range of pressures. Here each strand is a play of its own, not a set of bristles as in the diagnosis.
+
+use super::*;
+
+/// Ramps of the pressure at rest length, and a staircase that begins at the highest pressure.
+fn protocol() -> Campaign {
+    let mut step = Vec::new();
+    let mut ramps = |name: &str, to: &[f64], rate: f64, settle_s: f64| {
+        step.push(Step::File { name: name.into() });
+        for to_kpa in to {
+            step.push(Step::Pressure { to_kpa: *to_kpa, rate_kpa_s: Some(rate), settle_s });
+        }
+        step.push(Step::EndFile);
+    };
+    ramps("ramps", &[550.0, 0.0, 550.0, 0.0, 550.0], 22.0, 2.0);
+    let down: Vec<f64> = (0..10).map(|k| 550.0 - 60.0 * f64::from(k)).collect();
+    let there_and_back: Vec<f64> = down.iter().chain(down.iter().rev()).copied().collect();
+    ramps("staircase", &there_and_back, 200.0, 5.0);
+    ramps("ramps again", &[0.0, 550.0, 0.0], 22.0, 2.0);
+    play(&Protocol { name: "held".into(), sample_hz: 10.0, step }, &muscle()).expect("playable")
+}
+
+/// Friction of 8 % of strands that slip after changes of the pressure from 5 kPa up to `widest` (Pa). The part `fades` of the force is a
+/// bladder's that relaxes with a time constant of 8 s.
+fn recorded_with_strands(widest: f64, fades: f64, seed: u64) -> Campaign {
+    const STRANDS: usize = 12;
+    const SAMPLES_OF_8_S: f64 = 80.0;
+    let mut campaign = protocol();
+    let muscle = muscle();
+    let mut random = Random(seed);
+    let mut bent = [0.0_f64; STRANDS];
+    let (mut before, mut relaxed) = (0.0, 0.0);
+    for r in &mut campaign.recordings {
+        let Recording { pressure, force: Some(force), .. } = r else { continue };
+        for i in 0..force.len() {
+            let mut friction = 0.0;
+            for (k, z) in bent.iter_mut().enumerate() {
+                let slips = 5e3 * (widest / 5e3).powf(k as f64 / (STRANDS - 1) as f64);
+                *z = (*z + 2.0 * (pressure[i] - before) / slips).clamp(-1.0, 1.0);
+                friction += 0.08 * *z / STRANDS as f64;
+            }
+            before = pressure[i];
+            let quasi =
+                muscle.force(Pressure::from_pascals(pressure[i]), Length::from_metres(0.0), 0.0).newtons();
+            let pull = quasi.max(0.0);
+            relaxed += (pull - relaxed) * (1.0 - (-1.0 / SAMPLES_OF_8_S).exp());
+            force[i] = pull * (1.0 - friction) - fades * relaxed + 0.03 * random.normal();
+            pressure[i] += 100.0 * random.normal();
+        }
+    }
+    campaign
+}
+
+#[test]
+fn friction_that_turns_over_a_wide_range_of_pressure_is_no_missing_effect() {
+    for (widest, seed) in [(30e3, 1), (100e3, 2), (200e3, 3)] {
+        let d = ask(&recorded_with_strands(widest, 0.0, seed));
+        assert_eq!(d.verdict(), Verdict::Consistent, "{widest} Pa: {:?}, {:?}", names(&d), d.unexplained);
+        assert!(d.misfit_rms_N < 2e-3 * d.blocked_force_N, "{} N of {} N", d.misfit_rms_N, d.blocked_force_N);
+    }
+}
+
+#[test]
+fn beside_such_friction_a_relaxing_bladder_is_found() {
+    let d = ask(&recorded_with_strands(100e3, 0.05, 4));
+    assert!(
+        d.missing.iter().any(|m| {
+            m.effect == "stress-relaxation" || m.confusable_with.iter().any(|c| c == "stress-relaxation")
+        }),
+        "{:?} {:?}",
+        names(&d),
+        d.unexplained
+    );
+}
