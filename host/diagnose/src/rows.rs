@@ -76,8 +76,10 @@ pub(crate) struct RestFriction {
     pub settling: Vec<f64>,
     /// At rest, the direction that the model holds less the one that friction was found to have settled to.
     pub unsettled: Vec<f64>,
-    /// Number of the stretch of a hold over which friction rests at an unknown place in its gap; zero elsewhere.
+    /// Number of the stretch over which friction has an unknown place in its gap, or keeps a part of one; zero elsewhere.
     pub rest: Vec<u32>,
+    /// How much of the unknown place is kept at each row of such a stretch.
+    pub kept: Vec<f64>,
     /// Where the length was held throughout: for each change of pressure over which a part of friction may turn, the direction of that part
     /// less the one that friction was found to have. Empty elsewhere.
     pub turning: Vec<Vec<f64>>,
@@ -212,6 +214,7 @@ impl Rows {
             settling: pick(stride, &self.at_rest().settling),
             unsettled: pick(stride, &self.at_rest().unsettled),
             rest: pick(stride, &self.at_rest().rest),
+            kept: pick(stride, &self.at_rest().kept),
             turning: self.at_rest().turning.iter().map(|turned| pick(stride, turned)).collect(),
         };
         Self {
@@ -283,6 +286,7 @@ pub(crate) fn prepare_corrected(
         settling: vec![0.0; n],
         unsettled: vec![0.0; n],
         rest: vec![0; n],
+        kept: vec![0.0; n],
         turning: Vec::new(),
     };
     let rows = Rows {

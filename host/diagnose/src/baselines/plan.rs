@@ -41,7 +41,8 @@ pub(super) enum Part {
     /// How much of friction does not settle at rest: a friction that needs speed leaves a rest's gap half closed for another reason,
     /// and what it leaves must not be taken for settling.
     Unsettled,
-    /// Where in the gap between the branches friction rests over these rows: drift of the pressure moves it, and that is not measured.
+    /// Where in the gap between the branches friction rests over these rows, or begins: drift of the pressure moves it, and that is not
+    /// measured.
     Rest(usize, usize),
     /// How far friction reverses while the pressure ramps at held length, relative to a reversal of the stroke.
     Ramping,
@@ -54,7 +55,7 @@ impl Part {
     pub(super) fn departure(self, rows: &Rows, i: usize) -> f64 {
         match self {
             Self::Unsettled => rows.at_rest().unsettled[i],
-            Self::Rest(from, to) if (from..to).contains(&i) => 1.0,
+            Self::Rest(from, to) if (from..to).contains(&i) => rows.at_rest().kept[i],
             Self::Turning(part) => rows.at_rest().turning[part][i],
             Self::Ramping if rows.on_ramp[i] => rows.sign[i],
             _ => 0.0,

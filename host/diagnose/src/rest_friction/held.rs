@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use super::{RestLaw, followed, slip_beyond_play, smoothed};
 use crate::baselines::{self, Kind};
 use crate::criteria::rest_friction::{
-    CARRIED_PRESSURES, FOLLOWING_PRESSURES, HELD_ROWS, PRESSURE_SMOOTHING, REST_LAW_LEAVES, TURNING_PRESSURES,
+    BEGINNING_LEFT, CARRIED_PRESSURES, FOLLOWING_PRESSURES, HELD_ROWS, PRESSURE_SMOOTHING, REST_LAW_LEAVES,
+    TURNING_PRESSURES,
 };
 use crate::rows::{RestFriction, Rows};
 
@@ -23,6 +24,23 @@ fn direction(rows: &Rows, slips: &[f64], over: f64) -> Vec<f64> {
         if rows.sign[i] == 0.0 { 0.0 } else { direction }
     };
     slips.iter().enumerate().map(along).collect()
+}
+
+/// How much is left at every row of the place that friction has at the beginning of its recording: what moved the muscle before is
+/// unknown. All sets of bristles count the same.
+fn beginnings(rows: &Rows, slips: &[f64]) -> (Vec<u32>, Vec<f64>) {
+    let mut left = [1.0; TURNING_PRESSURES.len()];
+    let mut before = None;
+    let along = |(recording, slipped): (&u32, &f64)| {
+        if before != Some(*recording) {
+            (before, left) = (Some(*recording), [1.0; TURNING_PRESSURES.len()]);
+        } else {
+            left.iter_mut().zip(TURNING_PRESSURES).for_each(|(z, over)| *z *= (-slipped.abs() / over).exp());
+        }
+        let kept = left.iter().sum::<f64>() / left.len() as f64;
+        (if kept > BEGINNING_LEFT { recording + 1 } else { 0 }, kept)
+    };
+    rows.recording.iter().zip(slips).map(along).unzip()
 }
 
 /// The rows under a law: friction has the direction of one set of bristles, and with `others` the shares of the other sets are free.
@@ -37,7 +55,13 @@ fn under(rows: &Rows, (carries, over, pressure): (f64, f64, &[f64]), others: boo
     let contexts = rows.contexts().iter().zip(&whole);
     let contexts =
         contexts.map(|(c, whole)| model_core::effects::Context { direction: *whole, ..*c }).collect();
-    rows.with_contexts(contexts).with_rest_friction(RestFriction { turning, ..rows.at_rest().clone() })
+    let (rest, kept) = beginnings(rows, &slips);
+    rows.with_contexts(contexts).with_rest_friction(RestFriction {
+        turning,
+        rest,
+        kept,
+        ..rows.at_rest().clone()
+    })
 }
 
 /// Mean square error of the model on some of the rows, N².
