@@ -74,6 +74,8 @@ pub(crate) struct Baseline {
     pub elastic_nodes: Vec<Vec<f64>>,
     /// `k_F` per node of a flexible baseline.
     pub friction_nodes: Vec<f64>,
+    /// Shares of friction that turn over each of the changes of pressure, where the length was held throughout.
+    pub turning: Vec<f64>,
 }
 
 impl Baseline {
@@ -261,6 +263,7 @@ fn round(rows: &Rows, kind: Kind, effects: &[Vec<f64>], plan: &Plan, live: &[f64
             .map(|k| nodes(&|p| matches!(p, Part::Elastic(order, _) if *order == k)))
             .collect(),
         friction_nodes: nodes(&|p| matches!(p, Part::Friction(_))),
+        turning: nodes(&|p| matches!(p, Part::Turning(_))),
         span,
     }
 }
