@@ -76,6 +76,8 @@ pub(crate) struct Baseline {
     pub friction_nodes: Vec<f64>,
     /// Shares of friction that turn over each of the changes of pressure, where the length was held throughout.
     pub turning: Vec<f64>,
+    /// Places of friction in its gap, one for each stretch of [`RestFriction::rest`](crate::rows::RestFriction), beyond what the model holds.
+    pub places: Vec<f64>,
 }
 
 impl Baseline {
@@ -264,6 +266,7 @@ fn round(rows: &Rows, kind: Kind, effects: &[Vec<f64>], plan: &Plan, live: &[f64
             .collect(),
         friction_nodes: nodes(&|p| matches!(p, Part::Friction(_))),
         turning: nodes(&|p| matches!(p, Part::Turning(_))),
+        places: nodes(&|p| matches!(p, Part::Rest(..))),
         span,
     }
 }

@@ -239,7 +239,7 @@ pub fn by_name(name: &str, muscle: &Muscle, levels: &[f64], seed: u64) -> Option
         "C" => complete(muscle, levels, seed),
         "D" => upgraded(muscle, levels, seed),
         "staircase" => staircase(muscle, levels),
-        "one-staircase" => staircases(name, muscle, levels, &HELD[..1]),
+        "one-staircase" => staircases(name, muscle, levels, &[0.0; 3]),
         "one-ramps" => held_ramps(name, muscle, levels, &HELD[..1]),
         "ramps" => held_ramps(name, muscle, levels, &HELD),
         _ => return None,

@@ -58,7 +58,7 @@ pub struct Held {
 /// The campaigns, and what they are on the page.
 const CAMPAIGNS: [(&str, &str); 4] = [
     ("one-ramps", "ramps, one length"),
-    ("one-staircase", "staircase, one length"),
+    ("one-staircase", "staircases, one length"),
     ("ramps", "ramps, three lengths"),
     ("staircase", "staircases, three lengths"),
 ];

@@ -12,6 +12,10 @@ pam_data::criteria! {
     TURNING_PRESSURES: ([f64; 4]) = [3.0e3, 1.0e4, 3.0e4, 1.0e5], "b_k", "Pa", Derived("half decades, from a regulator's ripple to the range of most tests");
     /// The unknown place of friction at the beginning of a recording is followed until this part of it is left.
     BEGINNING_LEFT: f64 = 0.01, "dz", "1", Derived("a hundredth of a friction of 10 % of the force is 0.1 % of it");
+    /// Rows at the beginning of a recording are not judged while more than this part of it is left ...
+    BEGINNING_UNKNOWN: f64 = 0.3, "z_begin", "1", Judgement;
+    /// ... unless that would leave out more than this share of all rows.
+    MOST_BEGINNINGS: f64 = 0.2, "q_begin", "1", Judgement;
     /// Of a muscle that was held throughout this many rows decide how friction follows the pressure.
     HELD_ROWS: usize = 6000, "N_held", "1", Cost;
     /// Rows each way over which the pressure is smoothed, tried.

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use super::{RestLaw, followed, slip_beyond_play, smoothed};
 use crate::baselines::{self, Baseline, Kind};
 use crate::criteria::rest_friction::{
-    BEGINNING_LEFT, CARRIED_PRESSURES, FOLLOWING_PRESSURES, HELD_ROWS, PRESSURE_SMOOTHING, REST_LAW_LEAVES,
-    TURNING_PRESSURES,
+    BEGINNING_LEFT, BEGINNING_UNKNOWN, CARRIED_PRESSURES, FOLLOWING_PRESSURES, HELD_ROWS, MOST_BEGINNINGS,
+    PRESSURE_SMOOTHING, REST_LAW_LEAVES, TURNING_PRESSURES,
 };
 use crate::rows::{RestFriction, Rows};
 
@@ -46,53 +46,104 @@ impl Sets {
     }
 }
 
-/// Direction of friction at every row that turns over one change of the pressure. It begins at zero: nothing is known before the first row.
-fn direction(rows: &Rows, slips: &[f64], over: f64) -> Vec<f64> {
-    let mut direction = 0.0;
-    let along = |(i, slipped): (usize, &f64)| {
-        direction = followed(direction, *slipped, over);
-        if rows.sign[i] == 0.0 { 0.0 } else { direction }
-    };
-    slips.iter().enumerate().map(along).collect()
+/// How friction follows the pressure.
+struct Law<'a> {
+    /// Change of pressure that static friction carries, half-width, Pa.
+    carries: f64,
+    /// Pressure that is followed, Pa.
+    pressure: &'a [f64],
+    sets: Sets,
+    /// Direction of friction at the beginning of each recording; empty while it is unknown.
+    begun: Vec<f64>,
 }
 
-/// How much is left at every row of the place that friction has at the beginning of its recording: what moved the muscle before is
-/// unknown.
-fn beginnings(rows: &Rows, slips: &[f64], sets: &Sets) -> (Vec<u32>, Vec<f64>) {
-    let mut left = sets.shares.clone();
-    let mut before = None;
-    let along = |(recording, slipped): (&u32, &f64)| {
-        if before != Some(*recording) {
-            before = Some(*recording);
-            left.clone_from(&sets.shares);
+/// Whether a row is the first of its recording.
+fn begins(rows: &Rows, i: usize) -> bool {
+    i == 0 || rows.recording[i - 1] != rows.recording[i]
+}
+
+impl Law<'_> {
+    /// Direction of friction at every row that turns over one change of the pressure. Where the direction at the beginning of a recording
+    /// is unknown it goes on from the recording before.
+    fn direction(&self, rows: &Rows, slips: &[f64], over: f64) -> Vec<f64> {
+        let mut begun = self.begun.iter();
+        let mut direction = 0.0;
+        let along = |(i, slipped): (usize, &f64)| {
+            direction = followed(direction, *slipped, over);
+            if begins(rows, i) {
+                direction = begun.next().copied().unwrap_or(direction);
+            }
+            direction
+        };
+        slips.iter().enumerate().map(along).collect()
+    }
+
+    /// How much is left at every row of the place that friction has at the beginning of its recording, and the recording's number until
+    /// next to nothing is left.
+    fn left_of_beginnings(&self, rows: &Rows, slips: &[f64]) -> (Vec<u32>, Vec<f64>) {
+        let Sets { over, shares } = &self.sets;
+        let mut left = shares.clone();
+        let along = |(i, slipped): (usize, &f64)| {
+            if begins(rows, i) {
+                left.clone_from(shares);
+            } else {
+                left.iter_mut().zip(over).for_each(|(z, over)| *z *= (-slipped.abs() / over).exp());
+            }
+            let kept: f64 = left.iter().sum();
+            (if kept > BEGINNING_LEFT { rows.recording[i] + 1 } else { 0 }, kept)
+        };
+        slips.iter().enumerate().map(along).unzip()
+    }
+
+    /// The rows under the law: friction has the direction of the first set of bristles, and the shares of the others are free. So is the
+    /// place at the beginning of each recording while it is unknown.
+    fn of(&self, rows: &Rows) -> Rows {
+        let slips = slip_beyond_play(self.pressure, self.carries);
+        let whole = self.direction(rows, &slips, self.sets.over[0]);
+        let beyond = |over: &f64| {
+            let part = self.direction(rows, &slips, *over);
+            part.iter().zip(&whole).map(|(part, whole)| part - whole).collect()
+        };
+        let turning = self.sets.over[1..].iter().map(beyond).collect();
+        let (rest, kept) = if self.begun.is_empty() {
+            self.left_of_beginnings(rows, &slips)
         } else {
-            left.iter_mut().zip(&sets.over).for_each(|(z, over)| *z *= (-slipped.abs() / over).exp());
-        }
-        let kept: f64 = left.iter().sum();
-        (if kept > BEGINNING_LEFT { recording + 1 } else { 0 }, kept)
-    };
-    rows.recording.iter().zip(slips).map(along).unzip()
-}
+            (vec![0; rows.len()], vec![0.0; rows.len()])
+        };
+        let contexts = rows.contexts().iter().zip(&whole);
+        let contexts =
+            contexts.map(|(c, whole)| model_core::effects::Context { direction: *whole, ..*c }).collect();
+        rows.with_contexts(contexts).with_rest_friction(RestFriction {
+            turning,
+            rest,
+            kept,
+            ..rows.at_rest().clone()
+        })
+    }
 
-/// The rows under a law: friction has the direction of the first set of bristles, and the shares of the others are free.
-fn under(rows: &Rows, carries: f64, pressure: &[f64], sets: &Sets) -> Rows {
-    let slips = slip_beyond_play(pressure, carries);
-    let whole = direction(rows, &slips, sets.over[0]);
-    let beyond = |over: &f64| {
-        let part = direction(rows, &slips, *over);
-        part.iter().zip(&whole).map(|(part, whole)| part - whole).collect()
-    };
-    let turning = sets.over[1..].iter().map(beyond).collect();
-    let (rest, kept) = beginnings(rows, &slips, sets);
-    let contexts = rows.contexts().iter().zip(&whole);
-    let contexts =
-        contexts.map(|(c, whole)| model_core::effects::Context { direction: *whole, ..*c }).collect();
-    rows.with_contexts(contexts).with_rest_friction(RestFriction {
-        turning,
-        rest,
-        kept,
-        ..rows.at_rest().clone()
-    })
+    /// Rows at the beginnings of recordings that are not judged: the place from which friction turns is known from these rows alone. None
+    /// where that would leave out too many.
+    fn unknown(&self, rows: &Rows) -> Vec<bool> {
+        let slips = slip_beyond_play(self.pressure, self.carries);
+        let (_, left) = self.left_of_beginnings(rows, &slips);
+        let judged = |i: &usize| rows.root_weight()[*i] > 0.0;
+        let unknown: Vec<bool> = left.iter().map(|kept| *kept > BEGINNING_UNKNOWN).collect();
+        let count = (0..rows.len()).filter(judged).filter(|i| unknown[*i]).count();
+        let most = MOST_BEGINNINGS * (0..rows.len()).filter(judged).count() as f64;
+        if count as f64 > most { vec![false; rows.len()] } else { unknown }
+    }
+
+    /// The law with the shares and the beginnings that a fit of its rows found.
+    fn with_found(self, rows: &Rows, under: &Rows, fitted: &Baseline) -> Self {
+        let first = |i: &usize| begins(rows, *i);
+        let begun = (0..rows.len()).filter(first).zip(&fitted.places).map(|(i, place)| {
+            let turned = under.at_rest().turning.iter().zip(&fitted.turning);
+            let beyond: f64 = turned.map(|(part, share)| part[i] * share).sum();
+            (under.contexts()[i].direction + beyond + place).clamp(-1.0, 1.0)
+        });
+        let begun = begun.collect();
+        Self { begun, sets: self.sets.with_shares(fitted), ..self }
+    }
 }
 
 /// The model fitted to some of the rows, and its mean square error on them, N².
@@ -111,14 +162,15 @@ pub(super) fn settle(rows: &Rows) -> (Rows, Option<RestLaw>) {
         return (rows.clone(), None);
     }
     let pressures: Vec<Vec<f64>> = PRESSURE_SMOOTHING.iter().map(|h| smoothed(rows, *h)).collect();
-    let best = |laws: Vec<(f64, f64, usize)>, sets: fn(f64) -> Sets| {
-        let tried: Vec<f64> = laws
-            .par_iter()
-            .map(|(carries, over, smoothing)| {
-                fitted(&under(rows, *carries, &pressures[*smoothing], &sets(*over))).1
-            })
-            .collect();
-        laws.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1))
+    let law = |(carries, over, smoothing): (f64, f64, usize), sets: fn(f64) -> Sets| Law {
+        carries,
+        pressure: &pressures[smoothing],
+        sets: sets(over),
+        begun: Vec::new(),
+    };
+    let best = |tried: Vec<(f64, f64, usize)>, sets: fn(f64) -> Sets| {
+        let errors: Vec<f64> = tried.par_iter().map(|t| fitted(&law(*t, sets).of(rows)).1).collect();
+        tried.into_iter().zip(errors).min_by(|a, b| a.1.total_cmp(&b.1))
     };
     let plays = (0..PRESSURE_SMOOTHING.len())
         .flat_map(|smoothing| CARRIED_PRESSURES.iter().map(move |h| (*h, TURNING_PRESSURES[0], smoothing)));
@@ -131,9 +183,13 @@ pub(super) fn settle(rows: &Rows) -> (Rows, Option<RestLaw>) {
     // Effects see one direction: that of the set of bristles that comes closest alone.
     let alone = FOLLOWING_PRESSURES.iter().map(|over| (carries, *over, smoothing)).collect();
     let over = best(alone, Sets::one).map_or(TURNING_PRESSURES[0], |((_, over, _), _)| over);
-    let under = |sets: &Sets| under(rows, carries, &pressures[smoothing], sets);
-    let sets = Sets::with_others(over);
-    let first = under(&sets);
-    let sets = sets.with_shares(&fitted(&first).0);
-    (under(&sets), Some(RestLaw::Follows { carries, over, smoothing }))
+    // The shares of the sets give what is left of a beginning its shape.
+    let mut found = law((carries, over, smoothing), Sets::with_others);
+    let first = baselines::fit(&found.of(rows), Kind::Stiff, &[]);
+    found.sets = found.sets.with_shares(&first);
+    let under = found.of(rows);
+    let fitted = baselines::fit(&under, Kind::Stiff, &[]);
+    let found = found.with_found(rows, &under, &fitted);
+    let unknown = found.unknown(rows);
+    (found.of(rows).without(|i| unknown[i]), Some(RestLaw::Follows { carries, over, smoothing }))
 }
