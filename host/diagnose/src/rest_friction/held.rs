@@ -3,7 +3,7 @@
 //! After a reversal of the pressure the strands slip one after the other, so that friction turns over a wide range of changes. It
 //! is described by sets of bristles that break one after the other (generalised Maxwell slip: F. Al-Bender, V. Lampaert, J. Swevers,
 //! IEEE Transactions on Automatic Control 50 (2005) 1883-1887, doi 10.1109/TAC.2005.858676), each over its own change of pressure.
-//! Their shares are linear, and are fitted with the force; so is how far they are bent when a recording begins. The change that static
+//! Their shares, and how far they are bent when a recording begins, are linear and are fitted with the force. The change that static
 //! friction carries before any strand slips is not linear, and is found by trial.
 
 use rayon::prelude::*;
@@ -16,8 +16,7 @@ use crate::criteria::rest_friction::{
 };
 use crate::rows::{RestFriction, Rows};
 
-/// Changes of pressure over which the parts of friction turn, and for each its share: of a set beside the first none is known where the
-/// shares are still to be fitted.
+/// Changes of pressure over which the parts of friction turn, and the share of each. Before a fit all shares are the same.
 struct Sets {
     over: Vec<f64>,
     shares: Vec<f64>,
@@ -64,7 +63,7 @@ fn begins(rows: &Rows, i: usize) -> bool {
 
 impl Law<'_> {
     /// Direction of friction at every row that turns over one change of the pressure. Where the direction at the beginning of a recording
-    /// is unknown it goes on from the recording before.
+    /// is unknown it continues from the recording before.
     fn direction(&self, rows: &Rows, slips: &[f64], over: f64) -> Vec<f64> {
         let mut begun = self.begun.iter();
         let mut direction = 0.0;
@@ -146,12 +145,10 @@ impl Law<'_> {
     }
 }
 
-/// The model fitted to some of the rows, and its mean square error on them, N².
-fn fitted(rows: &Rows) -> (Baseline, f64) {
+/// Mean square error of the model on some of the rows, N².
+fn error(rows: &Rows) -> f64 {
     let rows = rows.thinned(rows.len().div_ceil(HELD_ROWS).max(1));
-    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-    let error = fitted.per_row(&rows);
-    (fitted, error)
+    baselines::fit(&rows, Kind::Stiff, &[]).per_row(&rows)
 }
 
 /// Finds how friction follows the pressure: the rows with its direction, and the law; none where friction turns at each reversal of the
@@ -169,7 +166,7 @@ pub(super) fn settle(rows: &Rows) -> (Rows, Option<RestLaw>) {
         begun: Vec::new(),
     };
     let best = |tried: Vec<(f64, f64, usize)>, sets: fn(f64) -> Sets| {
-        let errors: Vec<f64> = tried.par_iter().map(|t| fitted(&law(*t, sets).of(rows)).1).collect();
+        let errors: Vec<f64> = tried.par_iter().map(|t| error(&law(*t, sets).of(rows))).collect();
         tried.into_iter().zip(errors).min_by(|a, b| a.1.total_cmp(&b.1))
     };
     let plays = (0..PRESSURE_SMOOTHING.len())
@@ -177,13 +174,13 @@ pub(super) fn settle(rows: &Rows) -> (Rows, Option<RestLaw>) {
     let Some(((carries, _, smoothing), left)) = best(plays.collect(), Sets::with_others) else {
         return (rows.clone(), None);
     };
-    if !(left < REST_LAW_LEAVES * fitted(rows).1) {
+    if !(left < REST_LAW_LEAVES * error(rows)) {
         return (rows.clone(), None);
     }
     // Effects see one direction: that of the set of bristles that comes closest alone.
     let alone = FOLLOWING_PRESSURES.iter().map(|over| (carries, *over, smoothing)).collect();
     let over = best(alone, Sets::one).map_or(TURNING_PRESSURES[0], |((_, over, _), _)| over);
-    // The shares of the sets give what is left of a beginning its shape.
+    // How a beginning fades depends on the shares of the sets.
     let mut found = law((carries, over, smoothing), Sets::with_others);
     let first = baselines::fit(&found.of(rows), Kind::Stiff, &[]);
     found.sets = found.sets.with_shares(&first);
