@@ -258,13 +258,7 @@ fn settled(
     rest: Vec<u32>,
 ) -> Rows {
     let n = rows.len();
-    let mut found = RestFriction {
-        settling: vec![0.0; n],
-        unsettled: vec![0.0; n],
-        rest,
-        kept: vec![1.0; n],
-        turning: Vec::new(),
-    };
+    let mut found = RestFriction { rest, kept: vec![1.0; n], ..RestFriction::as_modelled(n) };
     let Some(law) = law else { return rows.with_rest_friction(found) };
     let mut contexts = rows.contexts().to_vec();
     for ((from, to), way) in holds.iter().zip(directions) {

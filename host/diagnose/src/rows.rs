@@ -85,6 +85,19 @@ pub(crate) struct RestFriction {
     pub turning: Vec<Vec<f64>>,
 }
 
+impl RestFriction {
+    /// Of `n` rows at which friction stays as the model holds it.
+    pub(crate) fn as_modelled(n: usize) -> Self {
+        Self {
+            settling: vec![0.0; n],
+            unsettled: vec![0.0; n],
+            rest: vec![0; n],
+            kept: vec![0.0; n],
+            turning: Vec::new(),
+        }
+    }
+}
+
 /// What one bladder for all pressures may do near full contraction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum SingleBladder {
@@ -282,18 +295,11 @@ pub(crate) fn prepare_corrected(
         has_temperature: gathered.has_temperature,
         isometric,
     };
-    let stays = RestFriction {
-        settling: vec![0.0; n],
-        unsettled: vec![0.0; n],
-        rest: vec![0; n],
-        kept: vec![0.0; n],
-        turning: Vec::new(),
-    };
     let rows = Rows {
         recorded: Arc::new(recorded),
         contexts: Arc::new(gathered.contexts),
         root_weight: Arc::new(root_weight),
-        rest_friction: Arc::new(stays),
+        rest_friction: Arc::new(RestFriction::as_modelled(n)),
         single_bladder: SingleBladder::default(),
         progress: SharedProgress::default(),
     };

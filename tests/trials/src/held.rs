@@ -3,7 +3,7 @@
 //!
 //! Friction of the muscles has several sets of bristles, so that it turns over a wide range of pressure after a reversal.
 
-use crate::answer::{Answer, recordings, run_limited};
+use crate::answer::{Answer, Missing, recordings};
 use crate::clopper::interval;
 use crate::generate;
 use crate::names::{SINGLES, class};
@@ -15,8 +15,7 @@ use crate::tool;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::path::PathBuf;
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
 
@@ -63,9 +62,6 @@ const CAMPAIGNS: [(&str, &str); 4] = [
     ("staircase", "staircases, three lengths"),
 ];
 
-/// Longest time for one answer.
-const LIMIT: Duration = Duration::from_secs(180);
-
 /// One muscle in one campaign.
 struct Case {
     campaign: usize,
@@ -95,7 +91,7 @@ impl Case {
 /// What an answer says about the effect that is there.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Said {
-    /// Named, and first.
+    /// Named.
     Named,
     /// Another effect of its class is named, or it is in the reported set.
     InClassOrSet,
@@ -120,7 +116,7 @@ impl Said {
     ];
 
     fn of(answer: &Answer, effect: &str, peak: f64) -> Self {
-        let in_set = |m: &crate::answer::Missing| m.confusable_with.iter().any(|c| c == effect);
+        let in_set = |m: &Missing| m.confusable_with.iter().any(|c| c == effect);
         if answer.missing.iter().any(|m| m.effect == effect) {
             Self::Named
         } else if answer.missing.iter().any(|m| class(&m.effect) == class(effect) || in_set(m)) {
@@ -160,17 +156,11 @@ fn ask(what: &Held, residuals: &Residuals, case: &Case) -> Result<(Answer, f64),
     for r in &trial.recordings {
         put(&format!("{}.csv", r.name), &r.csv(Columns::default()))?;
     }
-    let json = dir.join("answer.json");
-    let answer = diagnosed(&what.host, &dir, &json).map_err(|e| format!("{}: {e}", dir.display()))?;
+    let answer =
+        tool::answer(&what.host, &dir, &recordings(&dir)).map_err(|e| format!("{}: {e}", dir.display()))?;
     let effect = trial.truth.effects.first();
     let peak = effect.map_or(0.0, |e| 0.01 * e.amplitude_pct * trial.truth.blocked_force);
     Ok((answer, peak))
-}
-
-fn diagnosed(host: &Path, dir: &Path, json: &Path) -> Result<Answer, String> {
-    run_limited(&mut tool::diagnose(host, &dir.join("muscle.toml"), &recordings(dir), json), LIMIT)?;
-    let text = std::fs::read_to_string(json).map_err(|e| e.to_string())?;
-    serde_json::from_str(&text).map_err(|e| e.to_string())
 }
 
 fn percent(k: usize, n: usize) -> String {
@@ -287,7 +277,7 @@ const INTRODUCTION: &str = "# Trials at held length\n\nWritten by `cargo run --r
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::answer::{Considered, Missing};
+    use crate::answer::Considered;
 
     #[test]
     fn the_page_in_the_book_has_this_introduction() {

@@ -4,14 +4,13 @@
 //! mountings, three runs each). Only effects that need no knowledge of the muscle are added: they act on the columns. Each muscle is
 //! diagnosed as it is and with each effect; only the change of the answer counts.
 
-use crate::answer::{Answer, run_limited};
+use crate::answer::Answer;
 use crate::names::class;
 use crate::tool;
 use rayon::prelude::*;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use virtual_bench::rng::Rng;
 use virtual_bench::rubber::{Branches, Relaxation};
 
@@ -178,13 +177,6 @@ fn write(dir: &Path, m: &Muscle) -> Result<Vec<PathBuf>, String> {
         .collect()
 }
 
-fn ask(host: &Path, dir: &Path, files: &[PathBuf]) -> Result<Answer, String> {
-    let json = dir.join("answer.json");
-    run_limited(&mut tool::diagnose(host, &dir.join("muscle.toml"), files, &json), Duration::from_secs(180))?;
-    let text = std::fs::read_to_string(&json).map_err(|e| e.to_string())?;
-    serde_json::from_str(&text).map_err(|e| e.to_string())
-}
-
 fn names(a: &Answer) -> Vec<&str> {
     a.missing.iter().map(|m| m.effect.as_str()).collect()
 }
@@ -214,7 +206,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
             let m = effect.map_or_else(|| muscles[i].clone(), |(e, size)| inject(&muscles[i], e, size));
             let dir = output.join(&muscles[i].name).join(effect.map_or("as-it-is", |e| e.0));
             let files = write(&dir, &m)?;
-            Ok(ask(host, &dir, &files))
+            Ok(tool::answer(host, &dir, &files))
         })
         .collect();
     let answers = answers?;

@@ -2,8 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
-use crate::answer::recordings;
+use crate::answer::{Answer, recordings, run_limited};
+
+/// Longest time for one answer.
+const LIMIT: Duration = Duration::from_secs(180);
 
 /// `host diagnose` on a muscle's recordings, the answer as JSON into a file; a caller may add to it.
 pub fn diagnose(host: &Path, muscle: &Path, recordings: &[PathBuf], json: &Path) -> Command {
@@ -18,4 +22,12 @@ pub fn add_checks(command: &mut Command, trial: &Path) {
     for check in recordings(&trial.join("checks")) {
         command.arg("--check").arg(check);
     }
+}
+
+/// What `host diagnose` answers about recordings of the muscle described in a directory; the JSON stays there as `answer.json`.
+pub fn answer(host: &Path, dir: &Path, recordings: &[PathBuf]) -> Result<Answer, String> {
+    let json = dir.join("answer.json");
+    run_limited(&mut diagnose(host, &dir.join("muscle.toml"), recordings, &json), LIMIT)?;
+    let text = std::fs::read_to_string(&json).map_err(|e| e.to_string())?;
+    serde_json::from_str(&text).map_err(|e| e.to_string())
 }

@@ -14,7 +14,8 @@ use crate::criteria::rest_friction::{
     BEGINNING_LEFT, BEGINNING_UNKNOWN, CARRIED_PRESSURES, FOLLOWING_PRESSURES, HELD_ROWS, MOST_BEGINNINGS,
     PRESSURE_SMOOTHING, REST_LAW_LEAVES, TURNING_PRESSURES,
 };
-use crate::rows::{RestFriction, Rows};
+use crate::rows::Rows;
+use model_core::effects::Context;
 
 /// Changes of pressure over which the parts of friction turn, and the share of each. Before a fit all shares are the same.
 struct Sets {
@@ -103,21 +104,14 @@ impl Law<'_> {
             let part = self.direction(rows, &slips, *over);
             part.iter().zip(&whole).map(|(part, whole)| part - whole).collect()
         };
-        let turning = self.sets.over[1..].iter().map(beyond).collect();
-        let (rest, kept) = if self.begun.is_empty() {
-            self.left_of_beginnings(rows, &slips)
-        } else {
-            (vec![0; rows.len()], vec![0.0; rows.len()])
-        };
+        let mut at_rest = rows.at_rest().clone();
+        at_rest.turning = self.sets.over[1..].iter().map(beyond).collect();
+        if self.begun.is_empty() {
+            (at_rest.rest, at_rest.kept) = self.left_of_beginnings(rows, &slips);
+        }
         let contexts = rows.contexts().iter().zip(&whole);
-        let contexts =
-            contexts.map(|(c, whole)| model_core::effects::Context { direction: *whole, ..*c }).collect();
-        rows.with_contexts(contexts).with_rest_friction(RestFriction {
-            turning,
-            rest,
-            kept,
-            ..rows.at_rest().clone()
-        })
+        let contexts = contexts.map(|(c, whole)| Context { direction: *whole, ..*c }).collect();
+        rows.with_contexts(contexts).with_rest_friction(at_rest)
     }
 
     /// Rows at the beginnings of recordings that are not judged: the place from which friction turns is known from these rows alone. None
