@@ -4,11 +4,11 @@
 //! Friction of the muscles has several sets of bristles, so that it turns over a wide range of pressure after a reversal.
 
 use crate::answer::{Answer, Missing, recordings};
-use crate::clopper::interval;
 use crate::generate;
 use crate::names::{SINGLES, class};
 use crate::progress::Progress;
 use crate::queue::in_order;
+use crate::rate::Rate;
 use crate::residuals::Residuals;
 use crate::spec::{self, Operator, Size, Spec};
 use crate::tool;
@@ -163,11 +163,6 @@ fn ask(what: &Held, residuals: &Residuals, case: &Case) -> Result<(Answer, f64),
     Ok((answer, peak))
 }
 
-fn percent(k: usize, n: usize) -> String {
-    let (low, high) = interval(k, n);
-    format!("{k} of {n} ({:.0} to {:.0} %)", 100.0 * low, 100.0 * high)
-}
-
 fn clean_table(all: &[Answered<'_>]) -> Result<(String, usize), std::fmt::Error> {
     let mut text = "| campaign | named | unexplained | names |\n| --- | --- | --- | --- |\n".to_owned();
     let mut false_alarms = 0;
@@ -184,8 +179,8 @@ fn clean_table(all: &[Answered<'_>]) -> Result<(String, usize), std::fmt::Error>
         writeln!(
             text,
             "| {campaign} | {} | {} | {} |",
-            percent(named, n),
-            percent(unexplained, n),
+            Rate::new(named, n),
+            Rate::new(unexplained, n),
             names.join(", ")
         )?;
     }
@@ -268,7 +263,7 @@ pub fn run(what: &Held) -> Result<(), Box<dyn Error>> {
 const INTRODUCTION: &str = "# Trials at held length\n\nWritten by `cargo run --release -p trials -- held -o DIR --page \
     docs/src/proof-held.md`; nothing here is typed by hand. Muscles of the virtual bench were recorded with their length held: pressure \
     ramps or staircases, at one length or at three. Each muscle is drawn anew, with several sets of bristles, so that its friction turns \
-    over a wide range of pressure after a reversal. Rates have exact 95 % intervals.\n\n\
+    over a wide range of pressure after a reversal. Rates have exact 95 % intervals in brackets.\n\n\
     - **Clean muscles**: nothing is left out. Every name is a false alarm.\n\
     - **One effect**: counted is what the answer says about it. \"Class or set\": another effect of the same class is named, or the effect is \
     in the reported set. \"Could hide\": nothing is named, and the answer says that the effect could be there unseen with this size. \
