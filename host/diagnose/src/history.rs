@@ -14,9 +14,12 @@
 //! | [`table_unseen`] | each run predicted from the others by tables |
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
+//! | `beside` | which effect unseen runs need beside the memory |
 //! | `friction` | dry friction beside the memory, and in place of its fast part |
+//! | `late` | readings that come late |
 //! | `gap` | the gap between filling and emptying, and its cause |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
+//! | `slack_reading` | what the load cell reads of a slack muscle |
 //! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
@@ -25,6 +28,7 @@
 
 pub mod answer;
 
+mod beside;
 mod campaign;
 mod enter;
 mod findings;
@@ -32,11 +36,13 @@ mod friction;
 mod gap;
 mod held_table;
 mod judge;
+mod late;
 mod law;
 mod memory;
 mod places;
 mod run_offset;
 mod shift_fit;
+mod slack_reading;
 mod spline;
 mod staircase;
 pub mod table_fit;
@@ -51,11 +57,13 @@ pub use enter::{diagnose, is_from_history, reliable_recordings};
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;
 
+use self::beside::{Column, Needed};
 use self::campaign::Points;
 use self::criteria::{MEMORY_SINGLE_TIMES, TIMES};
-use self::friction::Friction;
+use self::friction::Instead;
 use self::law::{Law, Layer};
 use self::run_offset::Event;
+use self::slack_reading::SlackReading;
 use self::unseen::Unseen;
 use super::verdict::Region;
 pub(crate) use crate::criteria::history as criteria;
@@ -70,8 +78,10 @@ pub(super) struct Found {
     pub shifts: Vec<(Vec<f64>, Vec<f64>)>,
     /// The largest force that the memory makes, N.
     pub peak: f64,
-    /// Friction that unseen runs need beside the memory.
-    friction: Option<friction::Needed>,
+    /// The effect that unseen runs need beside the memory.
+    needed: Option<Needed>,
+    /// What the load cell reads of a slack muscle.
+    slack_reading: Option<SlackReading>,
 }
 
 /// All fits of a campaign.
@@ -90,7 +100,9 @@ struct Fits<'a> {
     with_slips: Option<(Law, Unseen)>,
     /// Unseen errors with the slips alone.
     slips_alone: Option<Unseen>,
-    friction: Friction,
+    needed: Option<Needed>,
+    instead: Instead,
+    slack_reading: Option<SlackReading>,
     /// Unseen error of the best law with one time constant over that of the spectrum, rms.
     single: f64,
 }
@@ -129,8 +141,8 @@ pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
         })
         .collect();
     let regions = places::regions(&points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
-    let needed = fits.friction.needed.clone();
-    Some(Found { answer, regions, shifts, peak, friction: needed })
+    let slack_reading = fits.slack_reading.clone();
+    Some(Found { answer, regions, shifts, peak, needed: fits.needed.clone(), slack_reading })
 }
 
 fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
@@ -155,11 +167,19 @@ fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
     let slips_alone =
         (!steps.is_empty()).then(|| unseen::shifted_curves(&layer, &steps, &vec![0.0; steps.len()]).0);
     let (reported, seen) = with_slips.as_ref().map_or((&law, &memory), |(l, u)| (l, u));
-    let friction = friction::of(&layer, reported, seen, &steps, geometry);
+    let areas = friction::areas(&layer, reported);
+    let mut directions = friction::directions(&layer, &areas, geometry);
+    let drive = directions.first();
+    let instead = drive.map(|d| friction::instead(&layer, (reported, seen), &steps, d)).unwrap_or_default();
+    let laws = directions.iter_mut().flat_map(|d| std::mem::take(&mut d.laws));
+    let columns: Vec<Column> = laws.chain(late::columns(points)).collect();
+    let base: Vec<Vec<f64>> = directions.into_iter().map(|d| d.base).collect();
+    let needed = beside::needed(&layer, (reported, seen), &steps, &base, &columns, &areas);
     let single = single_time(points, &law, &memory);
     Fits {
         by_direction: unseen::static_curves(points, true),
         plain: unseen::static_curves(points, false),
+        slack_reading: slack_reading::of(points, &layer.thresholds),
         layer,
         law,
         memory,
@@ -167,7 +187,8 @@ fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
         events,
         with_slips,
         slips_alone,
-        friction,
+        needed,
+        instead,
         single,
     }
 }

@@ -98,7 +98,7 @@ fn slip_beyond_play(pressure: &[f64], carries: f64) -> Vec<f64> {
 }
 
 /// The friction's direction after the pressure has gone on by `slipped` (Pa) beyond what static friction carries: it follows over `over` (Pa).
-fn followed(direction: f64, slipped: f64, over: f64) -> f64 {
+pub(crate) fn followed(direction: f64, slipped: f64, over: f64) -> f64 {
     let way = if slipped > 0.0 { 1.0 } else { -1.0 };
     way + (direction - way) * (-slipped.abs() / over).exp()
 }

@@ -77,6 +77,13 @@ pub enum Why {
         /// Error with a single time constant over that with the spectrum.
         one_time_constant_ratio: f64,
     },
+    /// The load cell does not read zero of a slack muscle.
+    SlackReading {
+        /// What it reads, N.
+        reading: f64,
+        /// Mountings that are slack at some pressure.
+        mountings: usize,
+    },
     /// Given by the user; the fit gives it no size.
     GivenWithoutSize,
     /// Given, and supported by the recordings.

@@ -73,6 +73,16 @@ pam_data::criteria! {
     MEMORY_KEPT_GAIN: f64 = 0.1, "g_k", "1", Measured("chosen on six muscles");
     /// And when its coefficient is this many standard errors.
     KEPT_ERRORS: f64 = 3.0, "t_k", "1", Measured("chosen on six muscles");
+    /// Changes of pressure over which friction may turn where it follows the pressure, half a decade apart.
+    FOLLOWED_OVER: ([f64; 3]) = [3e3, 1e4, 3e4], "b", "Pa", Derived("half decades: over less friction turns with the drive, over more no pulse turns it");
+    /// Time constants of a filter in the force channel that are tried, factors of two.
+    FILTER_TIMES: ([f64; 4]) = [0.05, 0.1, 0.2, 0.4], "tau_f", "s", Derived("from a few samples of such recordings to a period of the pulses");
+    /// A part of the pressure is read as force where the reading of a slack muscle follows the pressure over at least this range.
+    SLACK_RANGE: f64 = 100.0, "dP_slack", "kPa", Derived("a reading of 1 % of the force at the highest pressure is then a converter's step");
+    /// ... at pressures below this share of the one from which the muscle pulls: nearer to it a slack tube lifts.
+    SLACK_PART: f64 = 0.6, "p_slack", "1", Judgement;
+    /// ... and is more than this many times what a cell's zero must be off by to be named: a lifting tube makes as much.
+    SLACK_FOLLOWS: f64 = 3.0, "r_slack", "1", Measured("a lifting tube makes up to 2.0 times as much on eleven muscles");
     /// Least slope of a mounting's curve, as a share of the steepest, by which a friction force becomes a shift of pressure.
     LEAST_AREA: f64 = 0.3, "a_min", "1", Derived("a braid's area at two thirds of its largest contraction, strands 29° from the axis");
     /// The memory is the cause of the gap between filling and emptying if it takes at least this share of it.
@@ -144,6 +154,8 @@ pam_data::criteria! {
     TABLE_ROUNDS: usize = 40, "n_round", "1", Cost;
     /// The rounds end when the layers of the table differ from those it was fitted with by less than this share of the largest force.
     TABLE_SETTLED: f64 = 2e-4, "δ_round", "1", Derived("the remaining difference is below the noise of the readings");
+    /// Least number of points at which a mounting is slack, whose median is the reading of the load cell there.
+    SLACK_POINTS: usize = 3, "n_slack,m", "1", Derived("a median that one outlier does not decide");
     /// Least number of slack points whose median is the zero of the load cell.
     TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
     /// Nodes of a table of held lengths over the pressures that pull.

@@ -145,6 +145,8 @@ pub enum FindingKind {
     BadRun,
     /// The muscle had been loaded before the first run.
     LoadedBefore,
+    /// The load cell does not read zero of a slack muscle.
+    SlackReading,
 }
 
 /// Something documented of such muscles, as these recordings show it.

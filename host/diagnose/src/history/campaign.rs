@@ -1,6 +1,6 @@
 //! How a campaign was made: mountings, the runs of each, and the clock that starts with a mounting.
 
-use super::criteria::{LEAST_POINTS, LEAST_RUNS, LEAST_SPAN};
+use super::criteria::{FILTER_TIMES, FOLLOWED_OVER, LEAST_POINTS, LEAST_RUNS, LEAST_SPAN};
 use super::staircase::{self, Point};
 use pam_data::recording::{Campaign, Clock};
 
@@ -45,6 +45,12 @@ pub(super) struct Points {
     pub force: Vec<f64>,
     /// 1 filling, −1 emptying.
     pub direction: Vec<i8>,
+    /// The same as friction that follows the pressure has it.
+    pub followed: Vec<[f64; FOLLOWED_OVER.len()]>,
+    /// The pressure behind a filter, less the pressure, kPa.
+    pub filtered: Vec<[f64; FILTER_TIMES.len()]>,
+    /// Rate of the pressure, kPa/s; zero where a row is a point.
+    pub rate: Vec<f64>,
     pub mounting: Vec<usize>,
     pub run: Vec<usize>,
     /// Whether rows were averaged into settled points.
@@ -143,6 +149,9 @@ fn add(points: &mut Points, campaign: &Campaign, index: usize, settled: &[Point]
         points.pressure.push(p.pressure * 1e-3);
         points.force.push(p.force);
         points.direction.push(p.direction);
+        points.followed.push(p.followed);
+        points.filtered.push(p.filtered.map(|f| f * 1e-3));
+        points.rate.push(p.rate * 1e-3);
         points.mounting.push(mounting);
         points.run.push(points.runs.len());
     }

@@ -2,22 +2,27 @@
 
 use model_core::braid::{Braid, Geometry};
 
+use super::beside::Needed;
 use super::criteria::{
     ENTER_EXPLAINED, ENTER_REFUTES, ENTER_RESOLVED, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN, MOST_LOST,
 };
-use super::friction::{self, Needed};
+use super::findings::Contrast;
+use super::slack_reading::SlackReading;
 use super::{Found, History, found};
 use crate::baselines::{self, Kind};
+use crate::criteria::judgement::PARTLY_EXPLAINED;
 use crate::diagnosis::diagnose as statically;
 use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;
 use crate::verdict::{Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why};
 use crate::why::{Chance, Evidence};
-use model_core::effects::EffectName;
+use model_core::effects::{EffectName, Role};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
+use pam_fit::bench::Candidate;
+use pam_fit::confidence_band::HALF_95;
 
 /// The memory's parameter in an answer; the catalogue's `log-creep` is driven by another load and has other parameters.
 const RELAXED_SHARE: &str = "relaxed_share";
@@ -48,14 +53,24 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         return statically(campaign, geometry, options);
     };
     // What the user gives as known is fitted as it is, to the recordings as they are.
-    if !(found.answer.named && options.given.is_empty()) {
+    if !options.given.is_empty() {
         let mut diagnosis = statically(campaign, geometry, options)?;
         diagnosis.history = Some(found.answer);
         return Ok(diagnosis);
     }
+    let zero = found.slack_reading.clone().filter(|reading| reading.found);
+    if !found.answer.named {
+        let mut diagnosis = statically(&corrected(campaign.clone(), zero.as_ref()), geometry, options)?;
+        enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
+        zero.iter().for_each(|reading| enter_zero(&mut diagnosis, reading));
+        diagnosis.history = Some(found.answer);
+        return Ok(diagnosis);
+    }
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
-    let mut diagnosis = statically(&without_memory(&reliable, &found), geometry, options)?;
+    let freed = corrected(without_memory(&reliable, &found), zero.as_ref());
+    let mut diagnosis = statically(&freed, geometry, options)?;
     enter(&mut diagnosis, found);
+    zero.iter().for_each(|reading| enter_zero(&mut diagnosis, reading));
     // The failures were taken out before.
     if let Some(failures) = screened.remark() {
         diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
@@ -108,6 +123,18 @@ fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
     freed
 }
 
+/// The recordings without what the load cell reads of a slack muscle.
+fn corrected(mut campaign: Campaign, reading: Option<&SlackReading>) -> Campaign {
+    let Some(reading) = reading else { return campaign };
+    let (zero, per_pressure) = (reading.zero(), reading.per_pressure());
+    for recording in &mut campaign.recordings {
+        for (force, pressure) in recording.force.iter_mut().flatten().zip(&recording.pressure) {
+            *force -= zero + per_pressure * pressure;
+        }
+    }
+    campaign
+}
+
 /// Misfit of the model as it was on the recordings as they are, N.
 fn misfit(campaign: &Campaign, braid: &Braid<f64>) -> Result<Option<f64>> {
     let (rows, _) = rows::prepare(campaign, braid)?;
@@ -118,20 +145,14 @@ fn misfit(campaign: &Campaign, braid: &Braid<f64>) -> Result<Option<f64>> {
 }
 
 fn enter(diagnosis: &mut Diagnosis, found: Found) {
-    let Found { answer, regions, peak, friction, .. } = found;
+    let Found { answer, regions, peak, needed, .. } = found;
     let unseen = &answer.unseen;
     let left = (1.0 - unseen.gain).clamp(0.0, 1.0);
     let resolved = unseen.supported_with.rms_N <= ENTER_RESOLVED * answer.largest_force_N;
     // What the search calls a memory in recordings freed of it is the rest of the same.
     diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
     diagnosis.missing.insert(0, memory(&answer, peak));
-    let known = |n: &Needed| {
-        let says = |effect: &str| effect == n.name.effect.info().name;
-        diagnosis.missing.iter().any(|m| says(&m.effect) || m.confusable_with.iter().any(|c| says(c)))
-    };
-    if let Some(n) = friction.filter(|n| !known(n)) {
-        diagnosis.missing.insert(1, rubbing(&n, left));
-    }
+    enter_needed(diagnosis, needed.as_ref(), left);
     let freed_misfit = diagnosis.misfit_rms_N;
     let rest_agrees =
         !diagnosis.judged() || matches!(diagnosis.verdict(), Verdict::Consistent | Verdict::Explained);
@@ -220,17 +241,42 @@ fn memory(history: &History, peak: f64) -> Missing {
     }
 }
 
-/// Friction beside the memory as an entry of what is missing. `left` is the share of the squared error that the memory leaves.
-fn rubbing(needed: &Needed, left: f64) -> Missing {
-    let info = needed.name.effect.info();
+/// An effect that unseen runs need, where the search has not named it or one that it is not distinguished from. `left` is the share of the
+/// squared error that the memory leaves.
+fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
+    let known = |n: &Needed| {
+        let is_it = |effect: &str| effect == n.effect.info().name;
+        diagnosis.missing.iter().any(|m| is_it(&m.effect) || m.confusable_with.iter().any(|c| is_it(c)))
+    };
+    let Some(needed) = needed.filter(|n| !known(n)) else { return };
+    let from = diagnosis.missing.iter().take_while(|m| is_from_history(m)).count();
+    diagnosis.missing.insert(from, beside_memory(needed, left));
+    if !diagnosis.judged() {
+        return;
+    }
+    let verdict = match diagnosis.verdict() {
+        Verdict::Consistent => Verdict::Explained,
+        Verdict::Unexplained if needed.gain >= PARTLY_EXPLAINED => Verdict::PartlyExplained,
+        other => other,
+    };
+    diagnosis.outcome = Outcome::Judged(verdict);
+}
+
+/// An effect beside the memory as an entry of what is missing. `left` is the share of the squared error that the memory leaves.
+fn beside_memory(needed: &Needed, left: f64) -> Missing {
+    let info = needed.effect.info();
     let probability = if needed.confusable.is_empty() { ENTER_SURE } else { ENTER_UNSURE };
     let share = (left * needed.gain).clamp(0.0, 1.0);
     let parameters = info.parameters.iter().enumerate().map(|(k, parameter)| {
-        let value = if k == needed.name.amplitude { needed.value } else { 0.0 };
+        let value = match parameter.role {
+            Role::Shape => needed.shape.unwrap_or(0.0),
+            Role::Amplitude if k == needed.amplitude => needed.value,
+            Role::Amplitude => 0.0,
+        };
         ParameterValue {
             name: parameter.name.into(),
             value,
-            std: (value != 0.0).then_some(needed.error),
+            std: (k == needed.amplitude).then_some(needed.error),
             unit: parameter.unit.into(),
             outside_known_range: ParameterValue::is_outside(value, parameter),
         }
@@ -243,7 +289,7 @@ fn rubbing(needed: &Needed, left: f64) -> Missing {
         parameters: parameters.collect(),
         confusable_with: needed.confusable.iter().map(|e| e.info().name.to_owned()).collect(),
         place: info.link,
-        correction: false,
+        correction: matches!(needed.effect, Candidate::Bench(_)),
         checked: false,
         given: false,
         supported: true,
@@ -253,8 +299,45 @@ fn rubbing(needed: &Needed, left: f64) -> Missing {
         p: needed.chance,
         why: Why::Found(Evidence {
             share,
-            chance: Chance::Tested { effects: friction::LAWS.len(), p: needed.chance },
+            chance: Chance::Tested { effects: needed.tried, p: needed.chance },
             moment: None,
         }),
+    }
+}
+
+/// An error of the load cell that a slack muscle shows, as an entry of what is missing. It moves no curve against another, so that it
+/// explains no share of their error.
+fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
+    let info = reading.effect.info();
+    diagnosis.missing.retain(|m| m.effect != info.name);
+    let Contrast { mean, half, units, .. } = reading.mean;
+    let scale = (reading.amplitude / mean).abs();
+    let parameters = info.parameters.iter().take(1).map(|parameter| ParameterValue {
+        name: parameter.name.into(),
+        value: reading.amplitude,
+        std: half.map(|h| h * scale / HALF_95),
+        unit: parameter.unit.into(),
+        outside_known_range: ParameterValue::is_outside(reading.amplitude, parameter),
+    });
+    diagnosis.missing.push(Missing {
+        effect: info.name.into(),
+        probability: ENTER_UNSURE,
+        model_weight: ENTER_UNSURE,
+        share_explained: 0.0,
+        parameters: parameters.collect(),
+        confusable_with: reading.confusable.iter().map(|b| b.info().name.to_owned()).collect(),
+        place: info.link,
+        correction: true,
+        checked: false,
+        given: false,
+        supported: true,
+        summary: info.summary.into(),
+        source: info.source.into(),
+        peak_N: mean.abs(),
+        p: 1.0,
+        why: Why::SlackReading { reading: mean, mountings: units },
+    });
+    if diagnosis.judged() && diagnosis.verdict() == Verdict::Consistent {
+        diagnosis.outcome = Outcome::Judged(Verdict::Explained);
     }
 }

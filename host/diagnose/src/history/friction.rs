@@ -1,6 +1,7 @@
 //! Dry friction beside the memory: which laws of the catalogue act at held length, and whether unseen runs need one.
 //!
-//! At held length the strands' direction `s` follows filling and emptying. Each law is a loss of force, which as a shift of pressure is the
+//! At held length the strands' direction `s` follows filling and emptying; or it follows the pressure as it was read, and what a pulse
+//! overshoots by turns it back. The unseen runs decide which. Each law is a loss of force, which as a shift of pressure is the
 //! force over the slope of the mounting's curve:
 //!
 //! | law | force, N | over contraction |
@@ -16,84 +17,45 @@
 use model_core::braid::Geometry;
 use model_core::effects::EffectName;
 use model_core::units::Length;
-use pam_fit::numerics::student::{chance_beyond, half_width_95};
+use pam_fit::bench::Candidate;
 
-use super::campaign::Points;
-use super::criteria::{KEPT_ERRORS, LEAST_AREA, THRESHOLD_FROM, THRESHOLD_TO, TIMES};
-use super::held_table::{gain_by_runs, predicts_better};
+use super::beside::{Column, Tried, measured, no_worse, tried};
+use super::campaign::Run;
+use super::criteria::{FOLLOWED_OVER, LEAST_AREA, THRESHOLD_FROM, THRESHOLD_TO, TIMES};
 use super::law::{Law, Layer};
-use super::run_offset;
-use super::unseen::{self, Unseen, jackknife};
+use super::unseen::Unseen;
 
-/// A law of the catalogue: its effect, and which of the effect's amplitudes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Name {
-    pub effect: EffectName,
-    pub amplitude: usize,
-}
+/// The laws that a campaign at held lengths can show, each with one of its effect's amplitudes.
+const LAWS: [(EffectName, usize); 3] =
+    [(EffectName::CoulombFriction, 1), (EffectName::PressureFriction, 1), (EffectName::PressureFriction, 0)];
 
-/// The laws that a campaign at held lengths can show.
-pub(super) const LAWS: [Name; 3] = [
-    Name { effect: EffectName::CoulombFriction, amplitude: 1 },
-    Name { effect: EffectName::PressureFriction, amplitude: 1 },
-    Name { effect: EffectName::PressureFriction, amplitude: 0 },
-];
-
-/// Friction that unseen runs need beside the memory and the base model's own.
-#[derive(Clone, Debug)]
-pub(super) struct Needed {
-    pub name: Name,
-    /// Its amplitude, SI, and standard error (jackknife over runs).
-    pub value: f64,
-    pub error: f64,
-    /// Largest force, N.
-    pub peak: f64,
-    /// Share of the squared error of supported points that it removes beside the memory.
-    pub gain: f64,
-    /// Errors of unseen runs with the base model's friction alone, and with the law, rms, N.
-    pub rms: (f64, f64),
-    /// Probability of such a gain by chance among all laws.
-    pub chance: f64,
-    /// Other effects that predict the runs as well.
-    pub confusable: Vec<EffectName>,
-}
-
-/// What is known of friction.
+/// Friction in place of what the memory does within a run.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Friction {
-    pub needed: Option<Needed>,
+pub(super) struct Instead {
     /// Error of unseen runs with the memory, and the least with friction in place of what the memory does within a run, rms, N.
-    pub instead: Option<(f64, f64)>,
+    pub rms: Option<(f64, f64)>,
     /// The effects with which that predicts no worse.
     pub alternatives: Vec<EffectName>,
 }
 
-/// Laws as shifts of pressure, kPa, per unit of their amplitudes.
-struct Columns {
-    base: Vec<f64>,
-    laws: Vec<Vec<f64>>,
-    /// Slope of each mounting's curve where it pulls, N/kPa.
-    areas: Vec<f64>,
+/// Laws as shifts of pressure, kPa, per unit of their amplitudes, with one direction of friction.
+pub(super) struct Columns {
+    pub base: Vec<f64>,
+    pub laws: Vec<Column>,
 }
 
-/// Tests the laws beside the memory, and in place of its fast part.
-pub(super) fn of(
-    layer: &Layer<'_>,
-    law: &Law,
-    memory: &Unseen,
-    steps: &[Vec<f64>],
-    geometry: &Geometry,
-) -> Friction {
-    let Some(columns) = columns(layer, law, geometry) else { return Friction::default() };
-    let needed = needed(layer, law, steps, &columns);
-    let (instead, alternatives) = instead(layer, law, memory, steps, &columns);
-    Friction { needed, instead, alternatives }
+/// The laws with each direction that friction may have: that of the drive first, then those that follow the pressure.
+pub(super) fn directions(layer: &Layer<'_>, areas: &[f64], geometry: &Geometry) -> Vec<Columns> {
+    let points = layer.points;
+    let drive: Vec<f64> = points.direction.iter().map(|d| f64::from(*d)).collect();
+    let over = |over: usize| points.followed.iter().map(|f| f[over]).collect();
+    let followed = (0..FOLLOWED_OVER.len()).filter(|_| points.averaged).map(over);
+    std::iter::once(drive).chain(followed).filter_map(|d| columns(layer, areas, geometry, &d)).collect()
 }
 
-fn columns(layer: &Layer<'_>, law: &Law, geometry: &Geometry) -> Option<Columns> {
+fn columns(layer: &Layer<'_>, areas: &[f64], geometry: &Geometry, direction: &[f64]) -> Option<Columns> {
     let points = layer.points;
     let braid = geometry.build().ok()?;
-    let areas = areas(layer, law);
     let section = |radius: f64| std::f64::consts::PI * radius * radius;
     let sections: Vec<f64> = points
         .mountings
@@ -103,26 +65,33 @@ fn columns(layer: &Layer<'_>, law: &Law, geometry: &Geometry) -> Option<Columns>
     let at_rest = section(braid.rest_radius());
     let rubs = |force: &dyn Fn(usize) -> f64| -> Vec<f64> {
         let shift = |i: usize| force(i) / areas[points.mounting[i]];
-        (0..points.len()).map(|i| -f64::from(points.direction[i]) * shift(i)).collect()
+        // A slack muscle has no friction.
+        let pulls = |i: usize| points.pressure[i] > layer.thresholds[points.mounting[i]];
+        (0..points.len()).map(|i| if pulls(i) { -direction[i] * shift(i) } else { 0.0 }).collect()
     };
     let pressed = |i: usize| 1e3 * points.pressure[i].max(0.0);
     let laws = LAWS
         .iter()
-        .map(|name| match (name.effect, name.amplitude) {
-            (EffectName::CoulombFriction, _) => rubs(&|_| 1.0),
-            (_, 0) => rubs(&|i| pressed(i) * sections[points.mounting[i]]),
-            _ => rubs(&|i| pressed(i) * at_rest),
+        .map(|(effect, amplitude)| Column {
+            effect: Candidate::Muscle(*effect),
+            amplitude: *amplitude,
+            shape: None,
+            shift: match (effect, amplitude) {
+                (EffectName::CoulombFriction, _) => rubs(&|_| 1.0),
+                (_, 0) => rubs(&|i| pressed(i) * sections[points.mounting[i]]),
+                _ => rubs(&|i| pressed(i) * at_rest),
+            },
         })
         .collect();
     let base = rubs(&|i| {
         let m = points.mounting[i];
         (points.pressure[i] - layer.thresholds[m]).max(0.0) * areas[m]
     });
-    Some(Columns { base, laws, areas })
+    Some(Columns { base, laws })
 }
 
 /// Mean slope near the highest pressure. A mounting that hardly pulls tells none: then the least that a muscle has.
-fn areas(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
+pub(super) fn areas(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
     let points = layer.points;
     let slope = |m: usize| {
         let own = (0..points.len()).filter(|i| points.mounting[*i] == m);
@@ -135,109 +104,31 @@ fn areas(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
     slopes.iter().map(|s| s.max(LEAST_AREA * largest)).collect()
 }
 
-/// A law with further columns, its unseen runs, and the folds' values of the last coefficient.
-struct Tried {
-    law: Law,
-    unseen: Unseen,
-    squares: Vec<f64>,
-    rms: f64,
-}
-
-fn tried(layer: &Layer<'_>, start: &Law, steps: &[Vec<f64>], more: &[&Vec<f64>]) -> Tried {
-    let mut columns = steps.to_vec();
-    columns.extend(more.iter().map(|c| (*c).clone()));
-    let mut room = start.clone();
-    more.iter().for_each(|_| room.fit = run_offset::with_room(&room));
-    let law = layer.fit(&vec![true; layer.points.len()], Some(start.choice), &columns, Some(&room));
-    let unseen = unseen::with_memory(layer, &law, &columns, true);
-    measured(layer.points, law, unseen)
-}
-
-fn measured(points: &Points, law: Law, unseen: Unseen) -> Tried {
-    let supported = points.supported();
-    let square = |r: &super::campaign::Run| -> f64 {
-        let own = (r.points.0..r.points.1).filter(|i| supported[*i]);
-        own.map(|i| unseen.error(points, i).powi(2)).filter(|e| e.is_finite()).sum()
-    };
-    let squares = points.runs.iter().map(square).collect();
-    let rms = unseen.sizes(points, |i| supported[i]).rms;
-    Tried { law, unseen, squares, rms }
-}
-
-/// How many standard errors by runs one sum of squares lies below another.
-fn errors_below(with: &[f64], without: &[f64]) -> f64 {
-    let (gain, error) = gain_by_runs(with, without);
-    gain / error.max(f64::MIN_POSITIVE)
-}
-
-/// Whether one predicts no worse than another, by the 95 % interval over runs.
-fn no_worse(one: &[f64], other: &[f64]) -> bool {
-    errors_below(other, one) <= half_width_95(one.len().saturating_sub(1))
-}
-
-fn needed(layer: &Layer<'_>, law: &Law, steps: &[Vec<f64>], columns: &Columns) -> Option<Needed> {
-    let points = layer.points;
-    let base = tried(layer, law, steps, &[&columns.base]);
-    let all: Vec<Tried> =
-        columns.laws.iter().map(|column| tried(layer, law, steps, &[&columns.base, column])).collect();
-    let sum = |t: &Tried| t.squares.iter().sum::<f64>();
-    let best = (0..all.len()).min_by(|a, b| sum(&all[*a]).total_cmp(&sum(&all[*b])))?;
-    let (found, name) = (&all[best], LAWS[best]);
-    let value = found.law.fit.theta.last().copied()?;
-    let last = |l: &Law| l.fit.theta.last().copied().unwrap_or(0.0);
-    let error = jackknife(&found.unseen.folds.iter().map(last).collect::<Vec<_>>());
-    if !(predicts_better(&found.squares, &base.squares) && value > KEPT_ERRORS * error) {
-        return None;
-    }
-    let runs = points.runs.len();
-    let chance = 0.5 * chance_beyond(errors_below(&found.squares, &base.squares), runs as f64 - 1.0);
-    let mut confusable: Vec<EffectName> = (0..all.len())
-        .filter(|j| no_worse(&all[*j].squares, &found.squares))
-        .map(|j| LAWS[j].effect)
-        .filter(|effect| *effect != name.effect)
-        .collect();
-    confusable.dedup();
-    let force = |i: usize| (columns.laws[best][i] * columns.areas[points.mounting[i]] * value).abs();
-    Some(Needed {
-        name,
-        value,
-        error,
-        peak: (0..points.len()).map(force).fold(0.0, f64::max),
-        gain: 1.0 - sum(found) / sum(&base).max(f64::MIN_POSITIVE),
-        rms: (base.rms, found.rms),
-        chance: (chance * LAWS.len() as f64).min(1.0),
-        confusable,
-    })
-}
-
 /// Friction in place of what the memory does within a run: of the spectrum only the times stay that are longer than any run.
-fn instead(
+pub(super) fn instead(
     layer: &Layer<'_>,
-    law: &Law,
-    memory: &Unseen,
+    (law, memory): (&Law, &Unseen),
     steps: &[Vec<f64>],
     columns: &Columns,
-) -> (Option<(f64, f64)>, Vec<EffectName>) {
+) -> Instead {
     let points = layer.points;
-    let lasts = |r: &super::campaign::Run| {
+    let lasts = |r: &Run| {
         let own = points.time[r.points.0..r.points.1].iter();
         own.copied().fold(0.0, f64::max)
     };
     let longest = points.runs.iter().map(lasts).fold(0.0, f64::max);
     let slow: Vec<f64> = TIMES.iter().copied().filter(|t| *t > longest).collect();
     if slow.is_empty() || slow.len() == TIMES.len() {
-        return (None, Vec::new());
+        return Instead::default();
     }
     let slow = Layer::new(points, &slow);
     let start = slow.fit(&vec![true; points.len()], Some(law.choice), steps, Some(law));
     let whole = measured(points, law.clone(), memory.clone());
-    let all: Vec<Tried> =
-        columns.laws.iter().map(|column| tried(&slow, &start, steps, &[&columns.base, column])).collect();
+    let with = |law: &Column| tried(&slow, &start, steps, &[&columns.base, &law.shift]);
+    let all: Vec<Tried> = columns.laws.iter().map(with).collect();
     let least = all.iter().map(|t| t.rms).fold(f64::INFINITY, f64::min);
-    let mut alternatives: Vec<EffectName> = (0..all.len())
-        .filter(|j| no_worse(&all[*j].squares, &whole.squares))
-        .map(|j| LAWS[j].effect)
-        .collect();
+    let mut alternatives: Vec<EffectName> =
+        (0..all.len()).filter(|j| no_worse(&all[*j].squares, &whole.squares)).map(|j| LAWS[j].0).collect();
     alternatives.dedup();
-    (least.is_finite().then_some((whole.rms, least)), alternatives)
+    Instead { rms: least.is_finite().then_some((whole.rms, least)), alternatives }
 }

@@ -26,10 +26,10 @@ pub(super) fn finding(points: &Points, fits: &Fits<'_>, visits: &Visits, named: 
     let left = findings::gap_left(points, &unseen.predicted);
     // A memory that leaves most of the gap is not its cause.
     let explains = left.as_ref().is_none_or(|l| l.mean.abs() < (1.0 - GAP_EXPLAINED) * contrast.mean);
-    let needed = fits.friction.needed.as_ref();
+    let needed = fits.needed.as_ref();
     let cause = match (found, named && explains, needed) {
         (true, true, _) => Some(EffectName::LogCreep.info().name.to_owned()),
-        (true, false, Some(n)) => Some(n.name.effect.info().name.to_owned()),
+        (true, false, Some(n)) => Some(n.effect.info().name.to_owned()),
         _ => None,
     };
     let after = left.map(|l| format!("; the memory leaves {}", plus_minus(&l))).unwrap_or_default();
@@ -44,7 +44,7 @@ pub(super) fn finding(points: &Points, fits: &Fits<'_>, visits: &Visits, named: 
         }
     );
     let alternatives = if cause.is_some() && named {
-        fits.friction.alternatives.iter().map(|e| e.info().name.to_owned()).collect()
+        fits.instead.alternatives.iter().map(|e| e.info().name.to_owned()).collect()
     } else {
         Vec::new()
     };
@@ -64,7 +64,7 @@ pub(super) fn finding(points: &Points, fits: &Fits<'_>, visits: &Visits, named: 
 
 /// Friction beside the memory, as text.
 fn beside(fits: &Fits<'_>) -> String {
-    let Some(n) = fits.friction.needed.as_ref() else {
+    let Some(n) = fits.needed.as_ref() else {
         return "; dry friction beside it does not lower the error of unseen runs by enough to be named"
             .to_owned();
     };
@@ -74,7 +74,7 @@ fn beside(fits: &Fits<'_>) -> String {
         * n.peak;
     format!(
         "; beside it {} of up to {:.1} ± {half:.1} N lowers the error of unseen runs from {:.2} to {:.2} N (rms)",
-        n.name.effect.info().name,
+        n.effect.info().name,
         n.peak,
         n.rms.0,
         n.rms.1
@@ -83,10 +83,10 @@ fn beside(fits: &Fits<'_>) -> String {
 
 /// Friction in place of the memory's fast part, as text.
 fn instead(points: &Points, fits: &Fits<'_>) -> String {
-    let Some((whole, friction)) = fits.friction.instead else { return String::new() };
+    let Some((whole, friction)) = fits.instead.rms else { return String::new() };
     let percent = 100.0 / points.largest_force().max(f64::MIN_POSITIVE);
     let errors = format!("{:.2} % against {:.2} % of the largest force", percent * friction, percent * whole);
-    if fits.friction.alternatives.is_empty() {
+    if fits.instead.alternatives.is_empty() {
         format!(
             "; dry friction in place of the memory within a run is excluded: it predicts unseen runs worse ({errors})"
         )

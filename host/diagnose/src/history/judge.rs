@@ -11,6 +11,7 @@ use super::findings::{self, Contrast, Visits};
 use super::gap;
 use super::law::Law;
 use super::shift_fit::knot_step;
+use super::slack_reading::SlackReading;
 use super::unseen::{Sizes, Unseen};
 use model_core::effects::EffectName;
 use pam_data::recording::Campaign;
@@ -53,7 +54,9 @@ fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String
     let supported = points.supported();
     let counts = |i: usize| supported[i] && fits.by_direction.predicted[i].is_finite();
     let (_, unseen) = fits.best();
-    let after = unseen.sizes(points, counts);
+    // An effect that runs need beside the memory would hide what the memory does for them.
+    let needed = fits.needed.as_ref();
+    let after = needed.map_or(unseen, |n| &n.with_memory).sizes(points, counts);
     let mut why = Vec::new();
     if !(share >= MEMORY_LEAST_SHARE) {
         why.push(format!("the relaxed share is {share:.3}; {MEMORY_LEAST_SHARE} is the least that is named"));
@@ -65,7 +68,7 @@ fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String
     }
     let statics = [
         (&fits.by_direction, "a curve for each mounting and direction"),
-        (&fits.plain, "a curve for each mounting"),
+        (needed.map_or(&fits.plain, |n| &n.alone), "a curve for each mounting"),
     ];
     for (one, words) in statics {
         let gained = gain(one.sizes(points, counts), after);
@@ -194,6 +197,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             ),
         }
     }));
+    found.extend(fits.slack_reading.as_ref().map(SlackReading::finding));
     let loaded = fits.best().0.choice.loaded;
     if named && loaded >= JUDGE_LOADED_LONG {
         found.push(Finding {

@@ -1,7 +1,10 @@
 //! Isometric staircases: pulses of a valve, the settled point after each, and the direction of the drive.
 
-use super::criteria::{SETTLED_INTERVAL, STAIRCASE_TURN, STAIRCASE_WITHOUT_PULSES};
+use super::criteria::{
+    FILTER_TIMES, FOLLOWED_OVER, SETTLED_INTERVAL, STAIRCASE_TURN, STAIRCASE_WITHOUT_PULSES,
+};
 use crate::criteria::valve_pulses::{WINDOW_FROM, WINDOW_TO};
+use crate::rest_friction::followed;
 use crate::valve_pulses::{self, ValvePulses};
 use pam_data::recording::Recording;
 
@@ -16,6 +19,13 @@ pub(super) struct Point {
     pub force: f64,
     /// 1 filling, −1 emptying.
     pub direction: i8,
+    /// The direction of friction that follows the pressure as it was read, over each of [`FOLLOWED_OVER`]: what a pulse overshoots by turns
+    /// it back.
+    pub followed: [f64; FOLLOWED_OVER.len()],
+    /// The pressure behind a filter of first order with each of [`FILTER_TIMES`], less the pressure, Pa.
+    pub filtered: [f64; FILTER_TIMES.len()],
+    /// Mean rate of the pressure over the point, Pa/s; zero where a row is a point.
+    pub rate: f64,
 }
 
 /// The settled points of a recording, and whether rows were averaged into them.
@@ -31,6 +41,7 @@ pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool
 
 fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Point>, bool) {
     let interval = valve_pulses::interval(recording);
+    let history = PressureHistory::of(recording, directions);
     if !(interval < SETTLED_INTERVAL) {
         let points = (0..recording.len())
             .map(|i| Point {
@@ -38,6 +49,9 @@ fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Poi
                 pressure: recording.pressure[i],
                 force: force[i],
                 direction: directions[i],
+                followed: history.followed[i],
+                filtered: [0.0; FILTER_TIMES.len()],
+                rate: 0.0,
             })
             .collect();
         return (points, false);
@@ -48,34 +62,82 @@ fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Poi
         None => (STAIRCASE_WITHOUT_PULSES, 0.0, (0.0, 1.0)),
     };
     let mut points = Vec::new();
-    let mut open: Option<(i64, Point, f64)> = None;
+    let mut open: Option<i64> = None;
+    let mut own: Vec<usize> = Vec::new();
     for i in 0..recording.len() {
         let turns = (recording.time[i] - first - phase) / period;
         if !(window.0..window.1).contains(&(turns - turns.floor())) {
             continue;
         }
         let pulse = turns.floor() as i64;
-        match &mut open {
-            Some((p, sum, n)) if *p == pulse => {
-                sum.time += recording.time[i];
-                sum.pressure += recording.pressure[i];
-                sum.force += force[i];
-                *n += 1.0;
-            }
-            _ => {
-                points.extend(open.take().map(mean));
-                let [time, pressure] = [recording.time[i], recording.pressure[i]];
-                open =
-                    Some((pulse, Point { time, pressure, force: force[i], direction: directions[i] }, 1.0));
-            }
+        if open.is_some_and(|p| p != pulse) {
+            points.extend(mean(recording, force, directions, &history, &own));
+            own.clear();
         }
+        open = Some(pulse);
+        own.push(i);
     }
-    points.extend(open.map(mean));
+    points.extend(mean(recording, force, directions, &history, &own));
     (points, true)
 }
 
-fn mean((_, sum, n): (i64, Point, f64)) -> Point {
-    Point { time: sum.time / n, pressure: sum.pressure / n, force: sum.force / n, ..sum }
+/// The mean over rows of one pulse; `None` of none.
+fn mean(
+    recording: &Recording,
+    force: &[f64],
+    directions: &[i8],
+    history: &PressureHistory,
+    rows: &[usize],
+) -> Option<Point> {
+    let first = *rows.first()?;
+    let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|i| of(*i)).sum::<f64>() / rows.len() as f64;
+    let (time, pressure) = (mean(&|i| recording.time[i]), mean(&|i| recording.pressure[i]));
+    let spread = mean(&|i| (recording.time[i] - time).powi(2));
+    let along = mean(&|i| (recording.time[i] - time) * (recording.pressure[i] - pressure));
+    Some(Point {
+        time,
+        pressure,
+        force: mean(&|i| force[i]),
+        direction: directions[first],
+        followed: std::array::from_fn(|over| mean(&|i| history.followed[i][over])),
+        filtered: std::array::from_fn(|f| mean(&|i| history.filtered[i][f])),
+        rate: if spread > 0.0 { along / spread } else { 0.0 },
+    })
+}
+
+/// What follows the pressure as it was read, row by row; see [`Point`].
+struct PressureHistory {
+    followed: Vec<[f64; FOLLOWED_OVER.len()]>,
+    filtered: Vec<[f64; FILTER_TIMES.len()]>,
+}
+
+impl PressureHistory {
+    /// A recording begins with the direction that it goes on in, and at rest.
+    fn of(recording: &Recording, directions: &[i8]) -> Self {
+        let first = directions.first().map_or(1.0, |d| if *d < 0 { -1.0 } else { 1.0 });
+        let mut last = (recording.time.first().copied(), recording.pressure.first().copied());
+        let mut direction = [first; FOLLOWED_OVER.len()];
+        let mut behind = [0.0; FILTER_TIMES.len()];
+        let (followed, filtered) = recording
+            .time
+            .iter()
+            .zip(&recording.pressure)
+            .map(|(time, pressure)| {
+                let dt = last.0.map_or(0.0, |t| (time - t).max(0.0));
+                let change = last.1.map_or(0.0, |p| pressure - p);
+                last = (Some(*time), Some(*pressure));
+                direction.iter_mut().zip(FOLLOWED_OVER).for_each(|(s, over)| *s = followed(*s, change, over));
+                // The pressure is taken to ramp between samples.
+                behind.iter_mut().zip(FILTER_TIMES).for_each(|(b, tau)| {
+                    let kept = (-dt / tau).exp();
+                    let ramped = if dt > 0.0 { change * tau / dt * (1.0 - kept) } else { 0.0 };
+                    *b = *b * kept - ramped;
+                });
+                (direction, behind)
+            })
+            .unzip();
+        Self { followed, filtered }
+    }
 }
 
 /// What the bench says of each row; where it says nothing, what it said last.

@@ -18,11 +18,12 @@ use pam_fit::{Options as FitOptions, table_alone};
 
 use super::campaign::{self, Points};
 use super::criteria::{
-    PULLS, RAMP, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_LOADED, TABLE_LOADED_GAIN, TABLE_ROUNDS,
+    PULLS, TABLE_LEAST_DEADBAND, TABLE_LEAST_SLACK, TABLE_LOADED, TABLE_LOADED_GAIN, TABLE_ROUNDS,
     TABLE_SETTLED, TABLE_WIDTHS,
 };
 use super::held_table::{Open, Problem, Solution, predicts_better};
 use super::law::thresholds_of;
+use super::slack_reading::almost_pulls;
 use super::staircase;
 
 /// Which amplitudes are fitted.
@@ -326,10 +327,7 @@ fn chosen(campaign: &Campaign, used: &[bool]) -> Campaign {
 /// hangs, and lifts as it is filled: at lower pressures that is in the reading too.
 fn slack_reading(points: &Points, use_point: &[bool]) -> f64 {
     let thresholds = thresholds_of(points, use_point);
-    let almost = |i: &usize| {
-        let below = thresholds[points.mounting[*i]] - points.pressure[*i];
-        use_point[*i] && (RAMP..2.0 * RAMP).contains(&below)
-    };
+    let almost = |i: &usize| use_point[*i] && almost_pulls(points, &thresholds, *i);
     let mut read: Vec<f64> = (0..points.len()).filter(almost).map(|i| points.force[i]).collect();
     if read.len() < TABLE_LEAST_SLACK { 0.0 } else { median(&mut read) }
 }

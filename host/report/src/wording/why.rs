@@ -15,6 +15,10 @@ pub fn why(why: &Why) -> String {
             100.0 * gain,
             100.0 * least_gain,
         ),
+        Why::SlackReading { reading, mountings } => format!(
+            "the load cell reads {reading:.1} N of a slack muscle, with the same sign in all of {mountings} mountings; curves of force over \
+             pressure do not depend on it"
+        ),
         Why::GivenWithoutSize => {
             "given, but the recordings do not support it: its fitted amplitude is zero".to_owned()
         }

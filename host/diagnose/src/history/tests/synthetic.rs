@@ -1,13 +1,14 @@
 //! A muscle with and without memory.
 
 use super::super::answer::FindingKind;
-use super::super::friction::Needed;
+use super::super::beside::Needed;
 use super::super::{History, found, history};
 use crate::linear::Random;
 use model_core::braid::Geometry;
 use model_core::effects::EffectName;
 use model_core::table;
 use pam_data::recording::{Campaign, Clock, Recording};
+use pam_fit::bench::Candidate;
 
 /// What a synthetic campaign is made of.
 #[derive(Clone, Copy)]
@@ -42,9 +43,9 @@ const NO_MEMORY: Truth = Truth {
 };
 const MEMORY: Truth = Truth { share: 0.6, ..NO_MEMORY };
 
-const THRESHOLDS: [f64; 3] = [80.0, 220.0, 340.0];
-const PAUSE: f64 = 12.0;
-const TIMES: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
+pub(super) const THRESHOLDS: [f64; 3] = [80.0, 220.0, 340.0];
+pub(super) const PAUSE: f64 = 12.0;
+pub(super) const TIMES: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
 
 /// Pressure of a staircase, kPa: pulses every half second, filling to 27 s, emptying to 50 s.
 fn pressure(time: f64) -> f64 {
@@ -53,7 +54,7 @@ fn pressure(time: f64) -> f64 {
 }
 
 /// A pull that begins softly at a threshold, N.
-fn pull(pressure: f64, threshold: f64) -> f64 {
+pub(super) fn pull(pressure: f64, threshold: f64) -> f64 {
     let x = (pressure - threshold) / 25.0;
     0.75 * 25.0 * if x > 30.0 { x } else { x.exp().ln_1p() }
 }
@@ -108,7 +109,7 @@ fn campaign(truth: Truth, seed: u64) -> Campaign {
     Campaign::new(recordings)
 }
 
-fn geometry() -> Geometry {
+pub(super) fn geometry() -> Geometry {
     table::example().geometry.cast()
 }
 
@@ -171,7 +172,7 @@ fn dry_friction_alone_is_no_memory() {
 
 /// The friction that is named beside the memory.
 fn friction(campaign: &Campaign) -> Option<Needed> {
-    found(campaign, &geometry()).expect("a campaign of staircases").friction
+    found(campaign, &geometry()).expect("a campaign of staircases").needed
 }
 
 /// The same campaign by one clock, which gives the pauses.
@@ -189,7 +190,7 @@ fn friction_beside_the_memory_is_named_with_its_size() {
     for seed in 0..3 {
         let needed = friction(&clocked(Truth { strand: 2.0, runs: 8, ..MEMORY }, 200 + seed));
         let needed = needed.unwrap_or_else(|| panic!("seed {seed}: not named"));
-        assert_eq!(needed.name.effect, EffectName::CoulombFriction, "seed {seed}: {needed:?}");
+        assert_eq!(needed.effect, Candidate::Muscle(EffectName::CoulombFriction), "seed {seed}: {needed:?}");
         assert!((needed.value / 2.0 - 1.0).abs() < 0.4, "seed {seed}: {needed:?}");
     }
 }
