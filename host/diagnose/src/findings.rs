@@ -1,12 +1,14 @@
 //! Findings: the selected effects with parameters and probabilities, and the other candidates with the reason against each.
 
 use super::calibration;
+use super::candidate_fit::CandidateFit;
 use super::candidates::Candidate;
 use super::change_point;
-use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE};
+use super::criteria::candidates::{LEAST_SIGMA, SYSTEMATIC_ROWS};
+use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE, SIZE_STEP};
 use super::criteria::selection::{
     CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_COMPETITOR, SELECTION_FLOOR,
-    STATIC_PEAK,
+    STATIC_MOVED, STATIC_PEAK,
 };
 use super::intervals::deviations;
 use super::linear::energy;
@@ -82,6 +84,29 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
         .collect()
 }
 
+/// Root mean square from which on a trace would be named, N; infinite where none would. Noise hides a smaller one, given how much of it the
+/// base leaves, and what moves the force by less than the model's own inexactness is not named. Nor is a trace of which the base leaves
+/// no more than its law is wrong by.
+fn nameable(t: &CandidateFit, law_error: f64, selection: &Selection, sigma: f64, blocked: f64) -> f64 {
+    let independent = selection.noise.independent.max(DETECTION_ROWS);
+    let visible = t.visible.max(1e-12);
+    let detectable = DETECTION * sigma / independent.sqrt() / visible.sqrt();
+    let noise = sigma.max(LEAST_SIGMA * blocked);
+    let score = |size: f64| {
+        let seen = independent * (visible * (size / noise).powi(2)).ln_1p();
+        seen - independent.min(SYSTEMATIC_ROWS) * (law_error * size / noise).powi(2).ln_1p()
+    };
+    let floor = if t.beyond_tables < CONCEALED { STATIC_MOVED } else { SELECTION_FLOOR };
+    let mut size = detectable.max(floor * blocked / visible.sqrt());
+    while score(size) < LEAST_SCORE {
+        size *= SIZE_STEP;
+        if size > blocked {
+            return f64::INFINITY;
+        }
+    }
+    size
+}
+
 /// The candidates that were not selected: the share they would explain, the size at which they could be hidden, and what would show them.
 pub(crate) fn considered(
     selection: &Selection,
@@ -100,17 +125,14 @@ pub(crate) fn considered(
         .map(|(t, p)| {
             let name = library[t.candidate].name();
             let gain = (t.gain / selection.excess_energy).clamp(0.0, 1.0);
-            // The trace that noise could hide, given how much of it the base leaves; and below the size from which an effect that
-            // tables imitate is named at all it could be there anyway.
             let hidden = (t.size > 0.0 && t.peak > 0.0).then(|| {
-                let detectable = DETECTION * sigma
-                    / (selection.noise.independent.max(DETECTION_ROWS)).sqrt()
-                    / t.visible.max(1e-12).sqrt();
-                // What moves the force by less than the model's own inexactness is not named either.
-                let nameable = SELECTION_FLOOR * blocked / t.visible.max(1e-12).sqrt();
-                let by_noise = detectable.max(nameable) * t.peak / t.size;
+                let by_noise =
+                    nameable(t, library[t.candidate].law_error(&selection.rows), selection, sigma, blocked);
+                // Below the size from which an effect that tables imitate is named at all it could be there anyway; and so could what
+                // fits the misfit and was not named for another reason.
                 let least = if t.beyond_tables < CONCEALED { STATIC_PEAK * blocked } else { 0.0 };
-                by_noise.max(least)
+                let fitted = if gain >= LEAST_SHARE { t.peak } else { 0.0 };
+                (by_noise * t.peak / t.size).max(least).max(fitted)
             });
             let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD_SIZE * blocked);
             let unseen = hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked);

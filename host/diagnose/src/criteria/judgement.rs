@@ -46,6 +46,8 @@ pam_data::criteria! {
     DETECTION: f64 = 3.5, "z_det", "1", Derived("sqrt of the least score, 12");
     /// Independent rows on which a detection is reckoned, at least.
     DETECTION_ROWS: f64 = 4.0, "n_det", "1", Judgement;
+    /// Sizes from which an effect would be named are tried in steps of this factor.
+    SIZE_STEP: f64 = 1.1, "r_size", "1", Cost;
     /// A hidden effect larger than this share of the blocked force would be noticed by a user who knows the muscle.
     ABSURD_SIZE: f64 = 0.5, "F_absurd/F_b", "1", Judgement;
     /// An effect that could be hidden with more than this share of the blocked force is not excluded.

@@ -2,7 +2,7 @@
 //! pressure.
 //!
 //! A slack muscle pulls nothing. At lower pressures a tube that lies slack pushes or hangs, and lifts as it is filled, so that for the zero
-//! only points count at which the muscle almost pulls. A cell that reads the pressure does that at every length alike, while a tube lifts
+//! only points count at which the muscle almost pulls. A cell that reads the pressure does that equally at every length, while a tube lifts
 //! differently: far below the pull, the least of the slopes over the mountings is what the cell may read of the pressure.
 //! Unit of uncertainty: mounting.
 

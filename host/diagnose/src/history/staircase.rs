@@ -112,7 +112,7 @@ struct PressureHistory {
 }
 
 impl PressureHistory {
-    /// A recording begins with the direction that it goes on in, and at rest.
+    /// A recording begins with the direction that it continues in, and at rest.
     fn of(recording: &Recording, directions: &[i8]) -> Self {
         let first = directions.first().map_or(1.0, |d| if *d < 0 { -1.0 } else { 1.0 });
         let mut last = (recording.time.first().copied(), recording.pressure.first().copied());
