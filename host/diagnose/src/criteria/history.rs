@@ -83,6 +83,14 @@ pam_data::criteria! {
     SLACK_PART: f64 = 0.6, "p_slack", "1", Judgement;
     /// ... and is more than this many times what a cell's zero must be off by to be named: a lifting tube makes as much.
     SLACK_FOLLOWS: f64 = 3.0, "r_slack", "1", Measured("a lifting tube makes up to 2.0 times as much on eleven muscles");
+    /// The reading of a slack muscle is one of its zero only if it changes by less than this share of itself over the pressures at which it
+    /// is taken: a pull that begins softly doubles there.
+    SLACK_FLAT: f64 = 0.6, "r_flat", "1", Derived("from a to 2a the change is 0.67 of the mean");
+    /// ... and if a ramp beyond the pressure from which the muscle seems to pull the slope has this share of its final value.
+    SLACK_KNEE: f64 = 0.7, "q_knee", "1", Derived("a pull that begins over 100 kPa has 0.6 of it, one over 25 kPa 0.9");
+    /// A load cell reads the pressure only if the slope of its readings grows by less than this factor from the lower to the upper half of the
+    /// pressures far below the pull.
+    SLACK_STRAIGHT: f64 = 2.5, "r_straight", "1", Derived("a pull that begins over 100 kPa grows by 2.7 from half to half of 200 kPa");
     /// Least slope of a mounting's curve, as a share of the steepest, by which a friction force becomes a shift of pressure.
     LEAST_AREA: f64 = 0.3, "a_min", "1", Derived("a braid's area at two thirds of its largest contraction, strands 29° from the axis");
     /// The memory is the cause of the gap between filling and emptying if it takes at least this share of it.

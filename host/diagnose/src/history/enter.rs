@@ -248,12 +248,9 @@ fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
         let is_it = |effect: &str| effect == n.effect.info().name;
         diagnosis.missing.iter().any(|m| is_it(&m.effect) || m.confusable_with.iter().any(|c| is_it(c)))
     };
-    let Some(needed) = needed.filter(|n| !known(n)) else { return };
+    let Some(needed) = needed.filter(|n| diagnosis.judged() && !known(n)) else { return };
     let from = diagnosis.missing.iter().take_while(|m| is_from_history(m)).count();
     diagnosis.missing.insert(from, beside_memory(needed, left));
-    if !diagnosis.judged() {
-        return;
-    }
     let verdict = match diagnosis.verdict() {
         Verdict::Consistent => Verdict::Explained,
         Verdict::Unexplained if needed.gain >= PARTLY_EXPLAINED => Verdict::PartlyExplained,
@@ -308,6 +305,9 @@ fn beside_memory(needed: &Needed, left: f64) -> Missing {
 /// An error of the load cell that a slack muscle shows, as an entry of what is missing. It moves no curve against another, so that it
 /// explains no share of their error.
 fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
+    if !diagnosis.judged() {
+        return;
+    }
     let info = reading.effect.info();
     diagnosis.missing.retain(|m| m.effect != info.name);
     let Contrast { mean, half, units, .. } = reading.mean;
@@ -337,7 +337,7 @@ fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
         p: 1.0,
         why: Why::SlackReading { reading: mean, mountings: units },
     });
-    if diagnosis.judged() && diagnosis.verdict() == Verdict::Consistent {
+    if diagnosis.verdict() == Verdict::Consistent {
         diagnosis.outcome = Outcome::Judged(Verdict::Explained);
     }
 }

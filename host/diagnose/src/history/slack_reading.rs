@@ -11,9 +11,13 @@ use pam_fit::numerics::median;
 
 use super::answer::{Estimate, Finding, FindingKind};
 use super::campaign::Points;
-use super::criteria::{PULLS, RAMP, SLACK_FOLLOWS, SLACK_PART, SLACK_POINTS, SLACK_RANGE};
+use super::criteria::{
+    PULLS, RAMP, SLACK_FLAT, SLACK_FOLLOWS, SLACK_KNEE, SLACK_PART, SLACK_POINTS, SLACK_RANGE,
+    SLACK_STRAIGHT, THRESHOLD_FROM, THRESHOLD_TO,
+};
 use super::findings::Contrast;
 use super::judge::plus_minus;
+use super::shift_fit;
 
 /// Readings of a slack muscle.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,27 +44,57 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
     let by_mounting = |of: &dyn Fn(usize) -> Option<f64>| -> Vec<f64> {
         (0..points.mountings.len()).filter_map(of).collect()
     };
+    let almost = |m: usize| -> Vec<usize> {
+        (0..points.len())
+            .filter(|i| points.mounting[*i] == m && almost_pulls(points, thresholds, *i))
+            .collect()
+    };
     let read = by_mounting(&|m| {
-        let own =
-            (0..points.len()).filter(|i| points.mounting[*i] == m && almost_pulls(points, thresholds, *i));
-        let mut read: Vec<f64> = own.map(|i| points.force[i]).collect();
+        let mut read: Vec<f64> = almost(m).iter().map(|i| points.force[*i]).collect();
         (read.len() >= SLACK_POINTS).then(|| median(&mut read))
     });
-    let at_highest = by_mounting(&|m| slope(points, thresholds, m).map(|slope| slope * points.highest()));
-    let material = PULLS * points.largest_force();
+    let rises = by_mounting(&|m| {
+        let own = almost(m);
+        (own.len() >= SLACK_POINTS).then(|| RAMP * slope(points, &own)).filter(|rise| rise.is_finite())
+    });
     let zero = Contrast::of(&read).filter(|c| c.units > 1)?;
+    let rise = Contrast::of(&rises).map_or(0.0, |c| c.mean);
+    // A pull that begins softly is no reading of a slack muscle.
+    let sharp = begins_sharply(points, thresholds);
+    let far: Vec<FarBelow> =
+        (0..points.mountings.len()).filter_map(|m| FarBelow::of(points, thresholds, m)).collect();
+    let at_highest: Vec<f64> = far.iter().map(|f| f.slope * points.highest()).collect();
+    let straight = FarBelow::are_straight(&far) && sharp;
+    let material = PULLS * points.largest_force();
     let follows = Contrast::of(&at_highest).filter(|c| c.units > 1);
     let least = follows.map_or(0.0, |_| least_alike(&at_highest));
-    if let Some(mean) = follows.filter(|_| least.abs() > SLACK_FOLLOWS * material) {
+    if let Some(mean) = follows.filter(|_| straight && least.abs() > SLACK_FOLLOWS * material) {
         let amplitude = 1e-3 * least / points.highest();
         let effect = BenchName::CrossTalk;
         return Some(SlackReading { mean, effect, confusable: Vec::new(), amplitude, found: true });
     }
-    let found = least_alike(&read) != 0.0 && zero.mean.abs() > material;
+    let flat = rise.abs() < SLACK_FLAT * zero.mean.abs();
+    let found = least_alike(&read) != 0.0 && zero.mean.abs() > material && flat && sharp;
     // A mounting at full length is never slack: when the zero went off is not known.
     let mut confusable = vec![BenchName::ForceDrift, BenchName::Gravity];
     confusable.extend((least.abs() > material).then_some(BenchName::CrossTalk));
     Some(SlackReading { mean: zero, effect: BenchName::ForceOffset, confusable, amplitude: zero.mean, found })
+}
+
+/// Whether the pull begins sharply: soon after the pressure at which it seems to begin its slope is nearly the final one.
+fn begins_sharply(points: &Points, thresholds: &[f64]) -> bool {
+    let highest = points.highest();
+    let spline = shift_fit::static_spline(highest);
+    let share = |m: usize| {
+        let own = (0..points.len()).filter(|i| points.mounting[*i] == m);
+        let curve = shift_fit::static_curve(points, &spline, own)?;
+        let slope = |pressure: f64| spline.at(pressure).slope(&curve);
+        Some(slope(thresholds[m] + RAMP) / slope(THRESHOLD_TO * highest))
+    };
+    let seen = |m: &usize| (2.0 * RAMP..THRESHOLD_FROM * highest - RAMP).contains(&thresholds[*m]);
+    let mut all: Vec<f64> = (0..points.mountings.len()).filter(seen).filter_map(share).collect();
+    all.retain(|share| share.is_finite());
+    !all.is_empty() && median(&mut all) > SLACK_KNEE
 }
 
 /// The value of the least size where all have one sign; else zero.
@@ -69,24 +103,50 @@ fn least_alike(values: &[f64]) -> f64 {
     if values.iter().all(|v| v * least > 0.0) { least } else { 0.0 }
 }
 
-/// How much the reading of a mounting grows with the pressure far below the pull, N/kPa; `None` over too small a range.
-fn slope(points: &Points, thresholds: &[f64], mounting: usize) -> Option<f64> {
-    let slack = |i: &usize| {
-        points.mounting[*i] == mounting && points.pressure[*i] < SLACK_PART * thresholds[mounting]
-    };
-    let own: Vec<usize> = (0..points.len()).filter(slack).collect();
-    let count = own.len() as f64;
-    let mean = |of: &[f64]| own.iter().map(|i| of[*i]).sum::<f64>() / count;
+/// How much the reading of a mounting grows with the pressure far below the pull, N/kPa.
+struct FarBelow {
+    slope: f64,
+    /// The same over the lower and the upper half of the pressures.
+    halves: [f64; 2],
+}
+
+impl FarBelow {
+    /// `None` over too small a range.
+    fn of(points: &Points, thresholds: &[f64], mounting: usize) -> Option<Self> {
+        let below = |i: &usize| {
+            points.mounting[*i] == mounting && points.pressure[*i] < SLACK_PART * thresholds[mounting]
+        };
+        let own: Vec<usize> = (0..points.len()).filter(below).collect();
+        let pressures = || own.iter().map(|i| points.pressure[*i]);
+        let (low, high) =
+            (pressures().fold(f64::INFINITY, f64::min), pressures().fold(f64::NEG_INFINITY, f64::max));
+        let (lower, upper): (Vec<usize>, Vec<usize>) =
+            own.iter().partition(|i| points.pressure[**i] < 0.5 * (low + high));
+        let enough = lower.len().min(upper.len()) >= SLACK_POINTS && high - low >= SLACK_RANGE;
+        enough.then(|| Self {
+            slope: slope(points, &own),
+            halves: [slope(points, &lower), slope(points, &upper)],
+        })
+    }
+
+    /// Whether the slope does not grow with the pressure as that of a pull does which begins softly.
+    fn are_straight(of: &[Self]) -> bool {
+        let sum = |half: usize| of.iter().map(|f| f.halves[half]).sum::<f64>();
+        sum(1) / sum(0) > 0.0 && (sum(1) / sum(0)) < SLACK_STRAIGHT
+    }
+}
+
+/// Least-squares slope of the force over the pressure at some points, N/kPa; not a number where the pressure is one.
+fn slope(points: &Points, at: &[usize]) -> f64 {
+    let mean = |of: &[f64]| at.iter().map(|i| of[*i]).sum::<f64>() / at.len() as f64;
     let (pressure, force) = (mean(&points.pressure), mean(&points.force));
     let (mut along, mut spread) = (0.0, 0.0);
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for i in &own {
+    for i in at {
         let p = points.pressure[*i] - pressure;
-        (low, high) = (low.min(p), high.max(p));
         along += p * (points.force[*i] - force);
         spread += p * p;
     }
-    (own.len() >= SLACK_POINTS && high - low >= SLACK_RANGE).then(|| along / spread)
+    along / spread
 }
 
 impl SlackReading {

@@ -21,6 +21,8 @@ struct Bench {
     zero: f64,
     /// Its reading of the pressure, N/kPa.
     per_pressure: f64,
+    /// How many times as softly as the other muscles it begins to pull, less one.
+    softer: f64,
 }
 
 const RUNS: usize = 4;
@@ -66,7 +68,9 @@ fn run(
         let way = if p > last { 1.0 } else { -1.0 };
         direction = way + (direction - way) * (-(p - last).abs() / 10.0).exp();
         last = p;
-        let free = pull(p + 0.6 * states.iter().sum::<f64>() / 5.0, threshold);
+        let moved = p + 0.6 * states.iter().sum::<f64>() / 5.0;
+        let knee = 1.0 + bench.softer;
+        let free = knee * pull(threshold + (moved - threshold) / knee, threshold);
         let force = free - direction * bench.friction.min(free) + bench.zero + bench.per_pressure * p;
         let before = filtered.unwrap_or(force);
         let late: f64 = before + (force - before) * (1.0 - (-STEP / bench.filter.max(1e-6)).exp());
@@ -145,5 +149,14 @@ fn a_slack_muscle_shows_what_the_load_cell_reads() {
         assert!((reading.amplitude / amplitude - 1.0).abs() < 0.25, "{reading:?}, {amplitude} is true");
         let finding = found.answer.of(FindingKind::SlackReading).next().expect("a finding");
         assert_eq!(finding.cause.as_deref(), Some(effect.info().name));
+    }
+}
+
+#[test]
+fn a_pull_that_begins_softly_is_no_reading_of_a_slack_muscle() {
+    for softer in [1.5, 2.0, 3.0, 4.0] {
+        let found = asked(Bench { softer, ..Bench::default() }, 550);
+        let reading = found.slack_reading;
+        assert!(reading.as_ref().is_none_or(|r| !r.found), "{softer}: {reading:?}");
     }
 }
