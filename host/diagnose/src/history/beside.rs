@@ -120,6 +120,17 @@ fn best_possible(of: &[Tried], columns: &[Column]) -> Option<usize> {
     (0..of.len()).filter(possible).min_by(|a, b| of[*a].sum().total_cmp(&of[*b].sum()))
 }
 
+/// Other effects that predict the runs no worse than one of those tried.
+fn as_good(all: &[Tried], columns: &[Column], as_this: usize) -> Vec<Candidate> {
+    let as_good = |t: &Tried| no_worse(&t.squares, &all[as_this].squares) && t.amplitude().0 > 0.0;
+    let tried = all.iter().zip(columns).filter(|(t, _)| as_good(t));
+    let mut effects: Vec<Candidate> = tried.map(|(_, c)| c.effect).collect();
+    effects.retain(|effect| *effect != columns[as_this].effect);
+    effects.sort_unstable();
+    effects.dedup();
+    effects
+}
+
 /// The effect that predicts unseen runs best, where these need one in place of the base model's friction or beside it. `base` holds the
 /// base model's friction, one column for each direction that friction may have.
 pub(super) fn needed(
@@ -154,21 +165,9 @@ pub(super) fn needed(
     }
     let freedom = points.runs.len() as f64 - 1.0;
     let chance = 0.5 * chance_beyond(value / error.max(f64::MIN_POSITIVE), freedom);
-    let mut confusable: Vec<Candidate> = all
-        .iter()
-        .zip(columns)
-        .filter(|(t, c)| {
-            no_worse(&t.squares, &found.squares) && t.amplitude().0 > 0.0 && c.effect != column.effect
-        })
-        .map(|(_, c)| c.effect)
-        .collect();
-    confusable.sort_unstable();
-    confusable.dedup();
-    let mut columns_of_best = steps.to_vec();
-    columns_of_best.extend(with.is_some().then(|| null.checked_sub(1)).flatten().map(|b| base[b].clone()));
-    columns_of_best.push(column.shift.clone());
-    let start = &found.law.fit.theta[1..];
-    let (alone, _) = unseen::shifted_curves(layer, &columns_of_best, start);
+    let friction = null.checked_sub(1).filter(|_| with.is_some()).map(|b| base[b].clone());
+    let fitted: Vec<Vec<f64>> = steps.iter().cloned().chain(friction).chain([column.shift.clone()]).collect();
+    let (alone, _) = unseen::shifted_curves(layer, &fitted, &found.law.fit.theta[1..]);
     let force = |i: usize| (column.shift[i] * areas[points.mounting[i]] * value).abs();
     Some(Needed {
         effect: column.effect,
@@ -181,7 +180,7 @@ pub(super) fn needed(
         rms: (without.rms, found.rms),
         chance: (chance * columns.len() as f64).min(1.0),
         tried: columns.len(),
-        confusable,
+        confusable: as_good(all, columns, at),
         with_memory: found.unseen.clone(),
         alone,
     })
