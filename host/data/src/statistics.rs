@@ -20,6 +20,22 @@ pub fn ranked(values: &mut [f64], rank: usize) -> f64 {
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
+/// Least-squares slope of a line through points; 0 where they do not differ in their first value.
+///
+/// ```
+/// use pam_data::statistics::slope;
+/// assert_eq!(slope(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]), 2.0);
+/// assert_eq!(slope(&[(1.0, 3.0), (1.0, 5.0)]), 0.0);
+/// ```
+#[must_use]
+pub fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let xx: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    let xy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    if xx > 0.0 { xy / xx } else { 0.0 }
+}
+
 /// The median; of an even number of values the upper of the two in the middle, and 0 of no values. Reorders the values.
 ///
 /// ```

@@ -6,6 +6,7 @@
 //! differently: far below the pull, the least of the slopes over the mountings is what the cell may read of the pressure.
 //! Unit of uncertainty: mounting.
 
+use pam_data::statistics;
 use pam_fit::bench::BenchName;
 use pam_fit::numerics::median;
 
@@ -55,7 +56,7 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
     });
     let rises = by_mounting(&|m| {
         let own = almost(m);
-        (own.len() >= SLACK_POINTS).then(|| RAMP * slope(points, &own)).filter(|rise| rise.is_finite())
+        (own.len() >= SLACK_POINTS).then(|| RAMP * slope(points, &own))
     });
     let zero = Contrast::of(&read).filter(|c| c.units > 1)?;
     let rise = Contrast::of(&rises).map_or(0.0, |c| c.mean);
@@ -136,17 +137,9 @@ impl FarBelow {
     }
 }
 
-/// Least-squares slope of the force over the pressure at some points, N/kPa; not a number where the pressure is one.
+/// Slope of the force over the pressure at some points, N/kPa.
 fn slope(points: &Points, at: &[usize]) -> f64 {
-    let mean = |of: &[f64]| at.iter().map(|i| of[*i]).sum::<f64>() / at.len() as f64;
-    let (pressure, force) = (mean(&points.pressure), mean(&points.force));
-    let (mut along, mut spread) = (0.0, 0.0);
-    for i in at {
-        let p = points.pressure[*i] - pressure;
-        along += p * (points.force[*i] - force);
-        spread += p * p;
-    }
-    along / spread
+    statistics::slope(&at.iter().map(|i| (points.pressure[*i], points.force[*i])).collect::<Vec<_>>())
 }
 
 impl SlackReading {

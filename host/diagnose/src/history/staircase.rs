@@ -7,6 +7,7 @@ use crate::criteria::valve_pulses::{WINDOW_FROM, WINDOW_TO};
 use crate::rest_friction::followed;
 use crate::valve_pulses::{self, ValvePulses};
 use pam_data::recording::Recording;
+use pam_data::statistics::slope;
 
 /// The mean of the last part of a pulse period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,17 +92,15 @@ fn mean(
 ) -> Option<Point> {
     let first = *rows.first()?;
     let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|i| of(*i)).sum::<f64>() / rows.len() as f64;
-    let (time, pressure) = (mean(&|i| recording.time[i]), mean(&|i| recording.pressure[i]));
-    let spread = mean(&|i| (recording.time[i] - time).powi(2));
-    let along = mean(&|i| (recording.time[i] - time) * (recording.pressure[i] - pressure));
+    let course: Vec<(f64, f64)> = rows.iter().map(|i| (recording.time[*i], recording.pressure[*i])).collect();
     Some(Point {
-        time,
-        pressure,
+        time: mean(&|i| recording.time[i]),
+        pressure: mean(&|i| recording.pressure[i]),
         force: mean(&|i| force[i]),
         direction: directions[first],
         followed: std::array::from_fn(|over| mean(&|i| history.followed[i][over])),
         filtered: std::array::from_fn(|f| mean(&|i| history.filtered[i][f])),
-        rate: if spread > 0.0 { along / spread } else { 0.0 },
+        rate: slope(&course),
     })
 }
 

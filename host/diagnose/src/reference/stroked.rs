@@ -11,6 +11,7 @@ use super::shapes::{Change, Class};
 use super::strokes::{Band, Key, bands, ends, levels};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
+use pam_data::statistics::slope;
 
 /// What repeats between campaigns of strokes: shares of the largest force, or of friction. By principle; reshaped once after a first run
 /// on the cylinder's recordings (friction as a share of friction, not of force).
@@ -78,15 +79,6 @@ impl Weighed {
     pub fn none(&self) -> f64 {
         self.sets.iter().filter(|(s, _)| s.is_empty()).map(|(_, p)| p).sum()
     }
-}
-
-/// Slopes of a line through points.
-fn slope(points: &[(f64, f64)]) -> f64 {
-    let n = points.len() as f64;
-    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
-    let xx: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
-    let xy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
-    if xx > 0.0 { xy / xx } else { 0.0 }
 }
 
 /// Compares two campaigns. `reference_error`: what the reference itself is wrong by, N; zero for recordings.
