@@ -79,10 +79,12 @@ pub enum Why {
     },
     /// The load cell does not read zero of a slack muscle.
     SlackReading {
-        /// What it reads, N.
+        /// What it reads, N; of a reading that follows the pressure, at the highest pressure.
         reading: f64,
         /// Mountings that are slack at some pressure.
         mountings: usize,
+        /// Whether the reading follows the pressure.
+        follows_pressure: bool,
     },
     /// Given by the user; the fit gives it no size.
     GivenWithoutSize,

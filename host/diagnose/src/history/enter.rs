@@ -21,7 +21,7 @@ use model_core::effects::{EffectName, Role};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
-use pam_fit::bench::Candidate;
+use pam_fit::bench::{BenchName, Candidate};
 use pam_fit::confidence_band::HALF_95;
 
 /// The memory's parameter in an answer; the catalogue's `log-creep` is driven by another load and has other parameters.
@@ -176,9 +176,9 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     diagnosis.history = Some(answer);
 }
 
-/// Probability that chance alone gives a share this many standard errors from zero, by Chebyshev's inequality: no law of errors is assumed.
-fn chance(share: &super::answer::Estimate) -> f64 {
-    share.half().map_or(1.0, |h| (h / 1.96 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
+/// Probability that chance alone gives a value this many standard errors from zero, by Chebyshev's inequality: no law of errors is assumed.
+fn chance(of: &super::answer::Estimate) -> f64 {
+    of.half().map_or(1.0, |h| (h / 1.96 / of.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
 }
 
 /// The memory as an entry of what is missing.
@@ -310,12 +310,13 @@ fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
     }
     let info = reading.effect.info();
     diagnosis.missing.retain(|m| m.effect != info.name);
-    let Contrast { mean, half, units, .. } = reading.mean;
-    let scale = (reading.amplitude / mean).abs();
+    let Contrast { half, units, .. } = reading.mean;
+    let follows_pressure = reading.effect == BenchName::CrossTalk;
     let parameters = info.parameters.iter().take(1).map(|parameter| ParameterValue {
         name: parameter.name.into(),
         value: reading.amplitude,
-        std: half.map(|h| h * scale / HALF_95),
+        // The least of several slopes has no interval of its own.
+        std: half.filter(|_| !follows_pressure).map(|h| h / HALF_95),
         unit: parameter.unit.into(),
         outside_known_range: ParameterValue::is_outside(reading.amplitude, parameter),
     });
@@ -333,9 +334,9 @@ fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
         supported: true,
         summary: info.summary.into(),
         source: info.source.into(),
-        peak_N: mean.abs(),
-        p: 1.0,
-        why: Why::SlackReading { reading: mean, mountings: units },
+        peak_N: reading.force.abs(),
+        p: chance(&reading.estimate()),
+        why: Why::SlackReading { reading: reading.force, mountings: units, follows_pressure },
     });
     if diagnosis.verdict() == Verdict::Consistent {
         diagnosis.outcome = Outcome::Judged(Verdict::Explained);

@@ -31,6 +31,8 @@ pub(super) struct SlackReading {
     pub confusable: Vec<BenchName>,
     /// Its amplitude, SI.
     pub amplitude: f64,
+    /// The largest force that it makes, N.
+    pub force: f64,
     /// Whether all mountings agree in sign, and it is larger than what load cells are off by between sessions.
     pub found: bool,
 }
@@ -70,16 +72,28 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
     let follows = Contrast::of(&at_highest).filter(|c| c.units > 1);
     let least = follows.map_or(0.0, |_| least_alike(&at_highest));
     if let Some(mean) = follows.filter(|_| straight && least.abs() > SLACK_FOLLOWS * material) {
-        let amplitude = 1e-3 * least / points.highest();
-        let effect = BenchName::CrossTalk;
-        return Some(SlackReading { mean, effect, confusable: Vec::new(), amplitude, found: true });
+        return Some(SlackReading {
+            mean,
+            effect: BenchName::CrossTalk,
+            confusable: Vec::new(),
+            amplitude: 1e-3 * least / points.highest(),
+            force: least,
+            found: true,
+        });
     }
     let flat = rise.abs() < SLACK_FLAT * zero.mean.abs();
     let found = least_alike(&read) != 0.0 && zero.mean.abs() > material && flat && sharp;
     // A mounting at full length is never slack: when the zero went off is not known.
     let mut confusable = vec![BenchName::ForceDrift, BenchName::Gravity];
     confusable.extend((least.abs() > material).then_some(BenchName::CrossTalk));
-    Some(SlackReading { mean: zero, effect: BenchName::ForceOffset, confusable, amplitude: zero.mean, found })
+    Some(SlackReading {
+        mean: zero,
+        effect: BenchName::ForceOffset,
+        confusable,
+        amplitude: zero.mean,
+        force: zero.mean,
+        found,
+    })
 }
 
 /// Whether the pull begins sharply: soon after the pressure at which it seems to begin its slope is nearly the final one.
@@ -155,29 +169,36 @@ impl SlackReading {
 
     /// As a finding.
     pub(super) fn finding(&self) -> Finding {
-        let cause = match (self.effect, self.mean.mean > 0.0) {
-            (BenchName::CrossTalk, _) => {
-                " at the highest pressure, by the slope over lower ones: it reads the pressure"
-            }
-            (_, true) => ": the zero of the cell is off, or a weight hangs on it",
-            (_, false) => ": the zero of the cell is off, or the slack tube pushes",
+        let (value, mountings) = (plus_minus(&self.mean), self.mean.units);
+        let words = if self.effect == BenchName::CrossTalk {
+            format!(
+                "while the muscle is slack, the reading of the load cell grows with the pressure, by {value} up to the highest pressure \
+                 ({mountings} mountings): it reads the pressure"
+            )
+        } else {
+            let cause = match (self.found, self.mean.mean > 0.0) {
+                (false, _) => "",
+                (true, true) => ": the zero of the cell is off, or a weight hangs on it",
+                (true, false) => ": the zero of the cell is off, or the slack tube pushes",
+            };
+            format!("while the muscle is slack, the load cell reads {value} ({mountings} mountings){cause}")
         };
         Finding {
             kind: FindingKind::SlackReading,
             found: self.found,
-            size: Estimate::new(self.mean.mean, self.mean.half, "N", "mounting"),
-            units: self.mean.units,
+            size: self.estimate(),
+            units: mountings,
             squares: self.mean.squares,
             cause: self.found.then(|| self.effect.info().name.to_owned()),
             alternatives: Vec::new(),
             mounting: None,
             run: None,
-            words: format!(
-                "the load cell reads {} of a slack muscle ({} mountings){}",
-                plus_minus(&self.mean),
-                self.mean.units,
-                if self.found { cause } else { "" }
-            ),
+            words,
         }
+    }
+
+    /// The mean over mountings with its interval.
+    pub(super) fn estimate(&self) -> Estimate {
+        Estimate::new(self.mean.mean, self.mean.half, "N", "mounting")
     }
 }

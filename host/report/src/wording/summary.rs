@@ -6,6 +6,7 @@ use pam_diagnose::experiment::what_would_show;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict};
+use pam_diagnose::why::Why;
 
 use super::experiment::needs_strokes;
 use super::{
@@ -167,7 +168,8 @@ fn effect(s: &mut String, m: &Missing) {
 pub fn traded_off(m: &Missing) -> Option<&'static str> {
     let includes_zero =
         |p: &ParameterValue| p.value != 0.0 && p.std.is_some_and(|s| HALF_95 * s >= p.value.abs());
-    let tested = !m.given && !m.checked && !is_from_history(m);
+    let by_slack = matches!(m.why, Why::SlackReading { .. });
+    let tested = !m.given && !m.checked && !by_slack && !is_from_history(m);
     (tested && m.parameters.iter().any(includes_zero)).then_some(
         "the force of this effect is determined (the 95 % interval of its size excludes zero), its single parameters are not: \
          one compensates another",

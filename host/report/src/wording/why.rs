@@ -15,9 +15,13 @@ pub fn why(why: &Why) -> String {
             100.0 * gain,
             100.0 * least_gain,
         ),
-        Why::SlackReading { reading, mountings } => format!(
-            "the load cell reads {reading:.1} N of a slack muscle, with the same sign in all of {mountings} mountings; curves of force over \
-             pressure do not depend on it"
+        Why::SlackReading { reading, mountings, follows_pressure: false } => format!(
+            "while the muscle is slack, the load cell reads {reading:.1} N, with the same sign in all {mountings} mountings; curves of force \
+             over pressure do not depend on it"
+        ),
+        Why::SlackReading { reading, mountings, follows_pressure: true } => format!(
+            "while the muscle is slack, the reading of the load cell grows with the pressure in all {mountings} mountings; the least slope \
+             makes {reading:.1} N at the highest pressure"
         ),
         Why::GivenWithoutSize => {
             "given, but the recordings do not support it: its fitted amplitude is zero".to_owned()
@@ -38,7 +42,8 @@ pub fn why(why: &Why) -> String {
 fn evidence(e: &Evidence) -> String {
     let chance = match e.chance {
         Chance::Tested { effects, p } => {
-            format!("p = {p:.4} of finding as much by chance among all {effects} effects")
+            let p = if p < 5e-5 { "p < 0.0001".to_owned() } else { format!("p = {p:.4}") };
+            format!("{p} of finding as much by chance among all {effects} effects")
         }
         Chance::FewStrokes { p, log_ratio } => format!(
             "it acts in too few half-strokes for a test by blocks (p = {p:.2}), but is {} as likely as chance",
