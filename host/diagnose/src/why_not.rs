@@ -21,6 +21,8 @@ pub enum WhyNot {
     TooLittle,
     /// It explains less than what is named, and little beside it.
     LessThanNamed,
+    /// A slack muscle shows less of it.
+    SlackReading,
     /// A check of the bench measured it.
     Measured {
         /// Which check.

@@ -15,7 +15,9 @@ use crate::diagnosis::diagnose as statically;
 use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;
-use crate::verdict::{Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why};
+use crate::verdict::{
+    Considered, Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why, WhyNot,
+};
 use crate::why::{Chance, Evidence};
 use model_core::effects::{EffectName, Role};
 use pam_data::error::{DataCode, Error, Result};
@@ -63,14 +65,17 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         let mut diagnosis = statically(&corrected(campaign.clone(), zero.as_ref()), geometry, options)?;
         enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
         zero.iter().for_each(|reading| enter_zero(&mut diagnosis, reading));
+        update_considered(&mut diagnosis, found.slack_reading.as_ref());
         diagnosis.history = Some(found.answer);
         return Ok(diagnosis);
     }
+    let slack_reading = found.slack_reading.clone();
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
     let freed = corrected(without_memory(&reliable, &found), zero.as_ref());
     let mut diagnosis = statically(&freed, geometry, options)?;
     enter(&mut diagnosis, found);
     zero.iter().for_each(|reading| enter_zero(&mut diagnosis, reading));
+    update_considered(&mut diagnosis, slack_reading.as_ref());
     // The failures were taken out before.
     if let Some(failures) = screened.remark() {
         diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
@@ -340,5 +345,21 @@ fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
     });
     if diagnosis.verdict() == Verdict::Consistent {
         diagnosis.outcome = Outcome::Judged(Verdict::Explained);
+    }
+}
+
+/// Takes what is named now out of the effects that were considered, and limits those by what a slack muscle shows.
+fn update_considered(diagnosis: &mut Diagnosis, reading: Option<&SlackReading>) {
+    let missing = &diagnosis.missing;
+    diagnosis.considered.retain(|c| missing.iter().all(|m| m.effect != c.effect));
+    for (effect, limit) in reading.iter().flat_map(|r| &r.limits) {
+        let is_it = |c: &&mut Considered| c.effect == effect.info().name && !c.checked;
+        let Some(considered) = diagnosis.considered.iter_mut().find(is_it) else { continue };
+        if considered.hidden_up_to_N.is_none_or(|hidden| hidden > *limit) {
+            considered.hidden_up_to_N = Some(*limit);
+            if considered.why_not != WhyNot::Confusable {
+                considered.why_not = WhyNot::SlackReading;
+            }
+        }
     }
 }

@@ -35,6 +35,8 @@ pub(super) struct SlackReading {
     pub force: f64,
     /// Whether all mountings agree in sign, and it is larger than what load cells are off by between sessions.
     pub found: bool,
+    /// Up to which force, N, errors of the bench may be there that a slack muscle would show.
+    pub limits: Vec<(BenchName, f64)>,
 }
 
 /// Whether the muscle almost pulls at a point.
@@ -71,6 +73,7 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
     let material = PULLS * points.largest_force();
     let follows = Contrast::of(&at_highest).filter(|c| c.units > 1);
     let least = follows.map_or(0.0, |_| least_alike(&at_highest));
+    let limits = limits(&zero, follows.as_ref(), material);
     if let Some(mean) = follows.filter(|_| straight && least.abs() > SLACK_FOLLOWS * material) {
         return Some(SlackReading {
             mean,
@@ -79,6 +82,7 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
             amplitude: 1e-3 * least / points.highest(),
             force: least,
             found: true,
+            limits,
         });
     }
     let flat = rise.abs() < SLACK_FLAT * zero.mean.abs();
@@ -93,7 +97,17 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
         amplitude: zero.mean,
         force: zero.mean,
         found,
+        limits,
     })
+}
+
+/// What the intervals include, and what a tube makes that pushes, hangs or lifts.
+fn limits(zero: &Contrast, follows: Option<&Contrast>, material: f64) -> Vec<(BenchName, f64)> {
+    let of = |reading: &Contrast, tube: f64| reading.half.map(|half| reading.mean.abs() + half + tube);
+    let at_rest = [BenchName::ForceOffset, BenchName::Gravity].map(|b| (b, of(zero, material)));
+    let cross_talk = follows.and_then(|f| of(f, SLACK_FOLLOWS * material));
+    let all = at_rest.into_iter().chain([(BenchName::CrossTalk, cross_talk)]);
+    all.filter_map(|(effect, limit)| Some((effect, limit?))).collect()
 }
 
 /// Whether the pull begins sharply: soon after the pressure at which it seems to begin its slope is nearly the final one.

@@ -16,6 +16,7 @@ pub fn why_not(c: &Considered) -> String {
             return format!("measured with {check}: {value}{most}");
         }
         WhyNot::Hidden => return hidden(c),
+        WhyNot::SlackReading => "more of it would show in the readings of the slack muscle".to_owned(),
         WhyNot::NotExcited => "not excited by these recordings".to_owned(),
         WhyNot::Chance(p) => format!("explains no more than chance does over all effects tried (p = {p:.2})"),
         WhyNot::Refused => {

@@ -1,9 +1,10 @@
 //! Staircases recorded row by row, with pulses that ring: friction that they turn, and readings that are late or wrong.
 
 use super::super::answer::FindingKind;
-use super::super::{Found, found};
+use super::super::{Found, diagnose, found};
 use super::synthetic::{PAUSE, THRESHOLDS, TIMES, geometry, pull};
 use crate::linear::Random;
+use crate::options::Options;
 use model_core::effects::EffectName;
 use pam_data::recording::{Campaign, Recording};
 use pam_fit::bench::{BenchName, Candidate};
@@ -85,7 +86,7 @@ fn run(
     (times, pressures, forces)
 }
 
-fn asked(bench: Bench, seed: u64) -> Found {
+fn recorded(bench: Bench, seed: u64) -> Campaign {
     let mut random = Random(seed);
     let mut recordings = Vec::new();
     for (m, threshold) in THRESHOLDS.iter().enumerate() {
@@ -102,7 +103,11 @@ fn asked(bench: Bench, seed: u64) -> Found {
             });
         }
     }
-    found(&Campaign::new(recordings), &geometry()).expect("a campaign of staircases")
+    Campaign::new(recordings)
+}
+
+fn asked(bench: Bench, seed: u64) -> Found {
+    found(&recorded(bench, seed), &geometry()).expect("a campaign of staircases")
 }
 
 fn named(bench: Bench, seed: u64) -> Option<Candidate> {
@@ -159,4 +164,23 @@ fn a_pull_that_begins_softly_is_no_reading_of_a_slack_muscle() {
         let reading = found.slack_reading;
         assert!(reading.as_ref().is_none_or(|r| !r.found), "{softer}: {reading:?}");
     }
+}
+
+#[test]
+fn what_a_slack_muscle_excludes_cannot_be_hidden() {
+    let diagnosed = |bench| {
+        diagnose(&recorded(bench, 560), &geometry(), &Options::default()).expect("a diagnosis of staircases")
+    };
+    let effects = [(BenchName::ForceOffset, 0.06), (BenchName::Gravity, 0.06), (BenchName::CrossTalk, 0.15)];
+    let clean = diagnosed(Bench::default());
+    for (effect, share) in effects {
+        let considered =
+            clean.considered.iter().find(|c| c.effect == effect.info().name).expect("considered");
+        let hidden = considered.hidden_up_to_N.expect("a limit");
+        assert!(hidden < share * clean.blocked_force_N, "{considered:?}");
+    }
+    let off = diagnosed(Bench { zero: 9.0, ..Bench::default() });
+    let name = effects[0].0.info().name;
+    assert!(off.missing.iter().any(|m| m.effect == name), "{:?}", off.missing);
+    assert!(off.considered.iter().all(|c| c.effect != name), "{:?}", off.considered);
 }
