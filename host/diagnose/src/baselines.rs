@@ -327,7 +327,10 @@ fn values_within(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64], withi
     let mut settling = 0.0;
     let (mut elastic, mut departure) = (vec![0.0; n], vec![0.0; n]);
     let (shapes, contexts) = (&rows.shapes[within.clone()], &rows.contexts()[within.clone()]);
-    for (part, c) in plan.hard.iter().chain(&plan.soft).zip(solution).filter(|(_, c)| **c != 0.0) {
+    // How the force changes with the length differs between pressures by more than noise only where the length changes.
+    let hard = plan.hard.iter().map(|part| (part, 1.0));
+    let soft = plan.soft.iter().map(|part| (part, if rows.isometric { 0.0 } else { 1.0 }));
+    for ((part, sloped), c) in hard.chain(soft).zip(solution).filter(|(_, c)| **c != 0.0) {
         match *part {
             Part::Deadband => {
                 v.deadband = *c;
@@ -339,7 +342,7 @@ fn values_within(rows: &Rows, plan: &Plan, solution: &[f64], live: &[f64], withi
             Part::Elastic(k, f) => {
                 for (i, (shape, f)) in shapes.iter().zip(&plan.functions[f][within.clone()]).enumerate() {
                     elastic[i] += c * f * shape.elastic[k];
-                    v.stiffness[i] += c * f * shape.elastic_slope[k];
+                    v.stiffness[i] += sloped * c * f * shape.elastic_slope[k];
                 }
             }
             Part::Yeoh(k) => {

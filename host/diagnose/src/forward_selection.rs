@@ -151,10 +151,11 @@ impl<'a> ForwardSelection<'a> {
             .filter(|r| r.1 > CONFUSABLE)
             .map(|r| self.library[r.0].name().to_owned())
             .collect();
-        if open.len() > MOST_COMPETITORS {
+        let weight = 1.0 / (1.0 + competitors.iter().map(|r| r.1).sum::<f64>());
+        if open.len() > MOST_COMPETITORS || weight < CONFUSABLE {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
-                why: Refusal::Competitors { share: self.of_rest(&winner), others: open },
+                why: Refusal::Competitors { share: self.of_rest(&winner).min(1.0), others: open },
             });
             return ControlFlow::Break(());
         }

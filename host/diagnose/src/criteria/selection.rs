@@ -58,7 +58,8 @@ pam_data::criteria! {
     EXCHANGE_LEAVES: f64 = 0.8, "q_exchange", "1", Judgement;
     /// Excess error is at least this share of the error, so that shares of it stay finite.
     LEAST_EXCESS: f64 = 0.02, "q_excess", "1", Judgement;
-    /// A competitor of this weight keeps the effect from being selected itself; an exchanged effect counts with it.
+    /// A competitor of this weight keeps the effect from being selected itself; an exchanged effect counts with it. An effect of less weight
+    /// among all of its competitors is not selected.
     CONFUSABLE: f64 = 0.1, "w_conf", "1", Trials("sets of names made with it held the truth, with 3.3 members on average");
     /// A competitor of this weight is reported beside the selected effect.
     REPORTED_COMPETITOR: f64 = 0.15, "w_rep", "1", Trials("of 62 larger effects of a sealed set 59 sets held the truth, with 1.6 members (docs/src/proof.md)");
