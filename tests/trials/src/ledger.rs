@@ -21,9 +21,12 @@ pub struct Ledger {
     pub seed_sha256: String,
     /// SHA-256 of each sealed truth file, in order of the trials.
     pub truths: Vec<String>,
-    /// How many trials were drawn; the truths are those of the first of them.
+    /// How many trials were drawn; the truths are those of the first of them, or of the first of a protocol.
     #[serde(default)]
     pub drawn: usize,
+    /// The protocol whose trials are in the set; those of all protocols where absent.
+    #[serde(default)]
+    pub protocol: Option<String>,
     /// SHA-256 of each frozen answer, in order of the trials; empty before.
     pub answers: Vec<String>,
     /// Version and hash of the tool that answered.
@@ -126,6 +129,8 @@ pub struct Plan<'a> {
     pub seed: u64,
     /// How many trials were drawn, of which the first are made.
     pub drawn: usize,
+    /// The protocol whose trials are made, if not those of all.
+    pub protocol: Option<&'a str>,
     /// What noise is resampled from.
     pub residuals: &'a Residuals,
 }
@@ -163,6 +168,7 @@ pub fn write_set(output: &Path, plan: &Plan<'_>, specs: &[Spec]) -> Result<(), B
         seed_sha256: sha256(plan.seed.to_string().as_bytes()),
         truths: truths?,
         drawn: plan.drawn,
+        protocol: plan.protocol.map(str::to_owned),
         answers: Vec::new(),
         tool: String::new(),
         seconds: Vec::new(),

@@ -76,6 +76,9 @@ struct Set {
     /// Single effects and pairs of the set are these, in turn: names, or two names joined by +. For development.
     #[arg(long, value_delimiter = ',')]
     effects: Vec<String>,
+    /// Only trials of this protocol.
+    #[arg(long, value_parser = spec::PROTOCOLS)]
+    protocol: Option<String>,
     /// Make and score only this number of first trials: a stratified share, where time is short.
     #[arg(long)]
     take: Option<usize>,
@@ -350,6 +353,10 @@ fn specs(set: &str, what: &Set) -> Result<(u64, usize, Vec<spec::Spec>), Box<dyn
         spec::draw_of(seed, set, what.n, &spec::named(&what.effects)?)
     };
     let drawn = specs.len();
+    if let Some(only) = &what.protocol {
+        specs.retain(|s| s.protocol == only);
+        specs.iter_mut().enumerate().for_each(|(id, s)| s.id = id);
+    }
     specs.truncate(what.take.unwrap_or(drawn).max(1));
     Ok((seed, drawn, specs))
 }
@@ -362,7 +369,11 @@ fn generate(set: &str, what: &Set) -> Result<(), Box<dyn Error>> {
         eprintln!("no real recordings in {}: all noise is synthetic", what.data.display());
     }
     let start = Instant::now();
-    ledger::write_set(output, &ledger::Plan { set, seed, drawn, residuals: &residuals }, &specs)?;
+    ledger::write_set(
+        output,
+        &ledger::Plan { set, seed, drawn, protocol: what.protocol.as_deref(), residuals: &residuals },
+        &specs,
+    )?;
     println!("{} trials in {} ({:.1} s)", specs.len(), output.display(), start.elapsed().as_secs_f64());
     Ok(())
 }

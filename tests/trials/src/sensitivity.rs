@@ -274,20 +274,23 @@ fn criterion(name: &str) -> Option<&'static Criterion> {
 }
 
 /// The table of all criteria that change an answer, those that change none, and those that have not been measured.
-fn markdown(nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
+fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
+    let protocol = set.protocol.as_ref().map_or(String::new(), |p| format!(" --protocol {p}"));
     let mut m = format!(
         "# Sensitivity of the diagnosis to its criteria\n\n\
          Each criterion of `host/diagnose/src/criteria` at half and at double its value, on the same trials of a development set of the \
          virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and more whose first name is of the right class. \
          \"Answers changed\" counts trials that name something else than with the criteria as they are.\n\n\
          ```text\n\
-         cargo run --release -p trials -- generate --set dev --n {} -o SET\n\
+         cargo run --release -p trials -- generate --set {} --n {}{protocol} --take {} -o SET\n\
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
          These commands wrote this page. Criteria are scaled in groups of {GROUP} at first. Where a group changes no answer, none of its \
          criteria is counted as changing one; this overlooks two that cancel each other. Where it changes one, the group is halved until \
          the criteria are found that change an answer alone. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
          on each of them, not how good they are.\n\n",
+        set.set,
+        set.drawn,
         nominal.named.len()
     );
     let rate = |k: usize, n: usize| Rate::new(k, n).to_string();
@@ -367,7 +370,7 @@ pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    let page = markdown(&nominal, &rows, &open);
+    let page = markdown(&ledger::read_ledger(&study.set)?, &nominal, &rows, &open);
     std::fs::write(study.output.join("sensitivity.md"), &page)?;
     if let Some(path) = &study.page {
         std::fs::write(path, &page)?;
@@ -448,7 +451,18 @@ mod tests {
             (row("ALPHA", 0.5, ["leak", "backlash"]), row("ALPHA", 2.0, ["leak", "inertia"])),
             (row("GAMMA", 0.5, ["leak", "inertia"]), row("GAMMA", 2.0, ["leak", "inertia"])),
         ];
-        let page = markdown(&nominal, &rows, &["BETA".into()]);
+        let set = Ledger {
+            set: "dev".into(),
+            seed_sha256: String::new(),
+            truths: Vec::new(),
+            drawn: 345,
+            protocol: Some("A".into()),
+            answers: Vec::new(),
+            tool: String::new(),
+            seconds: Vec::new(),
+        };
+        let page = markdown(&set, &nominal, &rows, &["BETA".into()]);
+        assert!(page.contains("generate --set dev --n 345 --protocol A --take 2 -o SET"), "{page}");
         assert!(page.contains("| `ALPHA` |  | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
         assert!(page.contains("Without effect (1): `GAMMA`.") && page.contains("(1): `BETA`."), "{page}");
     }

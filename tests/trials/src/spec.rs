@@ -38,6 +38,9 @@ pub enum Size {
     Strength(f64),
 }
 
+/// The protocols of the sets.
+pub const PROTOCOLS: [&str; 3] = ["A", "D", "C"];
+
 /// One trial, drawn.
 #[derive(Debug, Clone)]
 pub struct Spec {
@@ -45,7 +48,7 @@ pub struct Spec {
     pub id: usize,
     /// What it is for.
     pub stratum: Stratum,
-    /// `A`, `D` or `C`.
+    /// One of [`PROTOCOLS`].
     pub protocol: &'static str,
     /// What is hidden: the effect and its requested size.
     pub effects: Vec<(Injection, Size)>,
@@ -207,7 +210,7 @@ pub fn draw(seed: u64, family: &str, composition: Composition) -> Vec<Spec> {
     for (id, stratum) in strata.drain(..).enumerate() {
         let n: &mut usize = per_stratum.entry(stratum).or_insert(0);
         // Three protocols equally within each stratum; for singles shifted on every round of the catalogue.
-        let protocol = ["A", "D", "C"][(*n + *n / SINGLES.len()) % 3];
+        let protocol = PROTOCOLS[(*n + *n / SINGLES.len()) % 3];
         let mut mine = Rng::stream(seed, &format!("{family} trial {id}"));
         let names: Vec<&'static str> = match stratum {
             Stratum::NullClean | Stratum::NullNasty => Vec::new(),
@@ -232,7 +235,7 @@ pub fn draw_of(seed: u64, family: &str, n: usize, lists: &[Vec<&'static str>]) -
     (0..n)
         .map(|id| {
             let names = &lists[id % lists.len()];
-            let protocol = ["A", "D", "C"][(id / lists.len()) % 3];
+            let protocol = PROTOCOLS[(id / lists.len()) % 3];
             let mut mine = Rng::stream(seed, &format!("{family} trial {id}"));
             let stratum = if names.len() > 1 { Stratum::Pair } else { Stratum::Single };
             let mut spec = one(id, stratum, protocol, names, None, &mut mine);
