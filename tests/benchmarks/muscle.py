@@ -39,8 +39,8 @@ def parts(x):
 def quasi(p, x):
     """Force without friction, N."""
     g, c = parts(x)
-    e = np.array([2.1e6, -1.5e6, 1.1e6, -0.2e6]) * (1 + 0.3 * (p - 207e3) / 345e3)
-    return (p - P0) * g + c @ e
+    e = np.array([2.1e6, -1.5e6, 1.1e6, -0.2e6])
+    return (p - P0) * g + (c @ e) * (1 + 0.3 * (p - 207e3) / 345e3)
 
 
 def stroke(p):

@@ -164,7 +164,7 @@ fn is_called(name: &str, word: &str) -> bool {
 }
 
 fn number(text: &str) -> Option<f64> {
-    decimal::prefix(text.as_bytes()).and_then(|(v, used)| (used == text.len()).then_some(v))
+    decimal::prefix(text.as_bytes(), b'.').and_then(|(v, used)| (used == text.len()).then_some(v))
 }
 
 /// Moves the zero of a displacement to where the muscle has its rest length.

@@ -21,6 +21,13 @@ pub(super) struct Dialect {
     pub skip_missing: bool,
 }
 
+impl Dialect {
+    /// The decimal sign.
+    pub(super) fn point(&self) -> u8 {
+        if self.decimal_comma { b',' } else { b'.' }
+    }
+}
+
 /// The requested form of one column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Want {
@@ -242,6 +249,7 @@ pub(super) fn parse(
 /// The usual line, without looking at it twice: plain numbers between delimiters. Anything else is left to [`row`].
 struct Quick<'a> {
     delimiter: u8,
+    point: u8,
     comment: Option<u8>,
     /// Per column of the file, which of the requested ones it is.
     columns: Vec<Option<(usize, f64, f64)>>,
@@ -258,11 +266,21 @@ impl<'a> Quick<'a> {
                 _ => return None,
             }
         }
-        let usual = !dialect.decimal_comma
-            && dialect.thousands.is_none()
-            && dialect.delimiter != b' '
-            && !dialect.delimiter.is_ascii_digit();
-        usual.then_some(Self { delimiter: dialect.delimiter, comment: dialect.comment, columns, wanted })
+        let (delimiter, point) = (dialect.delimiter, dialect.point());
+        let usual = dialect.thousands.is_none()
+            && delimiter != b' '
+            && delimiter != point
+            && !delimiter.is_ascii_digit();
+        usual.then_some(Self { delimiter, point, comment: dialect.comment, columns, wanted })
+    }
+
+    /// The number at a place, and where it ends.
+    #[inline]
+    fn number(&self, text: &[u8], at: usize) -> Option<(f64, usize)> {
+        decimal::plain(text, at, self.point).or_else(|| {
+            let (value, used) = decimal::prefix(text.get(at..)?, self.point)?;
+            value.is_finite().then_some((value, at + used))
+        })
     }
 
     /// Reads a line into `values` and gives its length with its end, or `None` if it is not quite usual.
@@ -277,7 +295,7 @@ impl<'a> Quick<'a> {
         for (i, column) in self.columns.iter().enumerate() {
             match column {
                 Some((n, scale, offset)) => {
-                    let (value, end) = decimal::plain(text, at)?;
+                    let (value, end) = self.number(text, at)?;
                     *values.get_mut(*n)? = value * scale + offset;
                     at = end;
                 }
@@ -392,7 +410,9 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
         "nan" | "inf" | "infinity" | "na" | "n/a" | "null" | "none" | "1.#inf" | "1.#qnan" | "#n/a" => {
             Fault::NotFinite
         }
-        _ if decimal::prefix(bare.as_bytes()).is_some_and(|(v, n)| n == bare.len() && !v.is_finite()) => {
+        _ if decimal::prefix(bare.as_bytes(), b'.')
+            .is_some_and(|(v, n)| n == bare.len() && !v.is_finite()) =>
+        {
             Fault::NotFinite
         }
         _ => Fault::NotANumber,

@@ -6,12 +6,12 @@ const POWERS: [f64; 23] = [
     1e19, 1e20, 1e21, 1e22,
 ];
 
-/// Parses a number at the start of `bytes`; returns it with its length in bytes, or `None`.
+/// Parses a number at the start of `bytes` whose decimal sign is `point`; returns it with its length in bytes, or `None`.
 ///
 /// Up to 2⁵³ and 10^±22 one multiplication or division of two exact doubles is correctly rounded (Clinger 1990); any other
 /// number goes through the standard library, which is correctly rounded too.
 #[inline]
-pub(super) fn prefix(bytes: &[u8]) -> Option<(f64, usize)> {
+pub(super) fn prefix(bytes: &[u8], point: u8) -> Option<(f64, usize)> {
     let mut at = 0;
     let negative = match bytes.first() {
         Some(b'-') => {
@@ -32,7 +32,7 @@ pub(super) fn prefix(bytes: &[u8]) -> Option<(f64, usize)> {
     }
     let mut digits = at - start;
     let mut exponent = 0i32;
-    if bytes.get(at) == Some(&b'.') {
+    if bytes.get(at) == Some(&point) {
         at += 1;
         let fraction = at;
         while let Some(digit) = digit(bytes, at) {
@@ -75,8 +75,9 @@ pub(super) fn prefix(bytes: &[u8]) -> Option<(f64, usize)> {
         let magnitude = if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power };
         return Some((if negative { -magnitude } else { magnitude }, at));
     }
-    let value = std::str::from_utf8(&bytes[..at]).ok()?.parse().ok()?;
-    Some((value, at))
+    let text = std::str::from_utf8(&bytes[..at]).ok()?;
+    let value = if point == b'.' { text.parse() } else { text.replace(char::from(point), ".").parse() };
+    Some((value.ok()?, at))
 }
 
 #[inline]
@@ -88,7 +89,7 @@ fn digit(bytes: &[u8], at: usize) -> Option<u64> {
 /// As [`prefix`], for the plain numbers that recordings are full of, eight digits at a time; `None` says nothing: the number
 /// may be longer, have an exponent, or be at the end of `bytes`.
 #[inline]
-pub(super) fn plain(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
+pub(super) fn plain(bytes: &[u8], at: usize, point: u8) -> Option<(f64, usize)> {
     let negative = *bytes.get(at)? == b'-';
     let at = at + usize::from(negative);
     let (whole, count) = run(bytes, at)?;
@@ -97,7 +98,7 @@ pub(super) fn plain(bytes: &[u8], at: usize) -> Option<(f64, usize)> {
     }
     let mut end = at + count;
     let (mut mantissa, mut digits, mut decimals) = (whole, count, 0);
-    if *bytes.get(end)? == b'.' {
+    if *bytes.get(end)? == point {
         end += 1;
         loop {
             let (fraction, count) = run(bytes, end)?;
@@ -179,7 +180,7 @@ mod tests {
             ("abc", None),
         ];
         for (text, expected) in cases {
-            assert_eq!(prefix(text.as_bytes()), expected, "{text}");
+            assert_eq!(prefix(text.as_bytes(), b'.'), expected, "{text}");
         }
     }
 
@@ -189,7 +190,7 @@ mod tests {
             let value = f64::from_bits(bits);
             prop_assume!(value.is_finite());
             for text in [format!("{value}"), format!("{value:e}")] {
-                let (read, used) = prefix(text.as_bytes()).unwrap();
+                let (read, used) = prefix(text.as_bytes(), b'.').unwrap();
                 prop_assert_eq!(read.to_bits(), value.to_bits(), "{}", &text);
                 prop_assert_eq!(used, text.len());
             }
@@ -197,17 +198,24 @@ mod tests {
 
         #[test]
         fn agrees_with_the_standard_library(text in "[+-]?[0-9]{1,22}(\\.[0-9]{0,22})?([eE][+-]?[0-9]{1,3})?") {
-            let (read, used) = prefix(text.as_bytes()).unwrap();
+            let (read, used) = prefix(text.as_bytes(), b'.').unwrap();
             let reference: f64 = text.parse().unwrap();
             prop_assert_eq!(read.to_bits(), reference.to_bits());
             prop_assert_eq!(used, text.len());
         }
 
         #[test]
+        fn a_comma_for_the_point_changes_nothing_else(text in "[+-]?[0-9]{1,22}(\\.[0-9]{0,22})?([eE][+-]?[0-9]{1,3})?;1234567") {
+            let comma = text.replace('.', ",");
+            prop_assert_eq!(prefix(comma.as_bytes(), b','), prefix(text.as_bytes(), b'.'));
+            prop_assert_eq!(plain(comma.as_bytes(), 0, b','), plain(text.as_bytes(), 0, b'.'));
+        }
+
+        #[test]
         fn the_quick_way_gives_the_same(text in "-?[0-9]{0,9}(\\.[0-9]{0,18})?[,\n;e][0-9,]{0,20}") {
-            let quick = plain(text.as_bytes(), 0);
+            let quick = plain(text.as_bytes(), 0, b'.');
             if let Some((value, end)) = quick {
-                let (reference, used) = prefix(text.as_bytes()).unwrap();
+                let (reference, used) = prefix(text.as_bytes(), b'.').unwrap();
                 prop_assert_eq!((value.to_bits(), end), (reference.to_bits(), used), "{}", text);
             }
         }
@@ -215,13 +223,13 @@ mod tests {
         #[test]
         fn the_quick_way_takes_the_usual(whole in 0..9_999_999u32, decimals in 0..9usize, fraction: u32) {
             let text = format!("-{whole}.{:0>1$},1234567", fraction % 10u32.pow(decimals as u32), decimals);
-            prop_assert!(plain(text.as_bytes(), 0).is_some());
+            prop_assert!(plain(text.as_bytes(), 0, b'.').is_some());
         }
 
         #[test]
         fn never_panics_and_never_reads_past_the_end(bytes: Vec<u8>) {
-            let _ = plain(&bytes, 0);
-            if let Some((_, used)) = prefix(&bytes) {
+            let _ = plain(&bytes, 0, b'.');
+            if let Some((_, used)) = prefix(&bytes, b'.') {
                 prop_assert!(used <= bytes.len() && used > 0);
             }
         }

@@ -9,6 +9,7 @@ mod expected_force;
 mod steps;
 
 use std::borrow::Cow;
+use std::cell::LazyCell;
 use std::ops::Range;
 
 use super::sensor_faults::{self, Kind, SensorFault, sensor_faults};
@@ -223,13 +224,14 @@ fn find(campaign: &Campaign) -> Vec<Dropout> {
     for (recording, edges) in edges.iter().enumerate() {
         let r = &campaign.recordings[recording];
         let Some(force) = r.force.as_deref() else { continue };
+        let noticeable = LazyCell::new(|| expected.noticeable(force));
         let mut free = 0;
         for stretch in stretches(edges, &r.time, &r.pressure) {
             // The return edge of one drop-out is not the first edge of the next.
             if stretch.rows.start < free {
                 continue;
             }
-            if expected.continues(&stretch, r, force) {
+            if expected.continues(&stretch, r, force, *noticeable) {
                 free = stretch.rows.end + 1;
                 found.push(Dropout {
                     recording,

@@ -92,18 +92,11 @@ impl<'a> Cells<'a> {
                 Some(separator) => thousands::without(text.trim(), separator, decimal_comma)?,
                 None => Cow::Borrowed(text.trim()),
             };
-            let (value, used) = if decimal_comma {
-                // A point would be a separator of thousands, whose meaning we do not guess.
-                if text.contains('.') {
-                    return None;
-                }
-                decimal::prefix(text.replace(',', ".").as_bytes())?
-            } else {
-                decimal::prefix(text.as_bytes())?
-            };
+            // A point beside a decimal comma would separate thousands, whose meaning we do not guess.
+            let (value, used) = decimal::prefix(text.as_bytes(), self.dialect.point())?;
             return (used == text.len() && value.is_finite()).then_some(value);
         }
-        let (value, used) = decimal::prefix(&self.line[start..])?;
+        let (value, used) = decimal::prefix(&self.line[start..], b'.')?;
         self.at = self.end_of_blank_run(self.after(start + used)?);
         value.is_finite().then_some(value)
     }

@@ -147,8 +147,14 @@ impl ExpectedForce {
         self.floor
     }
 
-    /// Whether the force continues through a stretch, and for a while after, as if its pressure steps had not happened.
-    pub(super) fn continues(&self, stretch: &Stretch, r: &Recording, force: &[f64]) -> bool {
+    /// The least change of the expected force, N, that a recording's force would show.
+    pub(super) fn noticeable(&self, force: &[f64]) -> f64 {
+        (NOTICEABLE.0 * self.span).max(NOTICEABLE.1 * white_noise(force))
+    }
+
+    /// Whether the force continues through a stretch, and for a while after, as if its pressure steps had not happened. `least` is what
+    /// [`Self::noticeable`] gives of the recording.
+    pub(super) fn continues(&self, stretch: &Stretch, r: &Recording, force: &[f64], least: f64) -> bool {
         let Range { start, end } = stretch.rows;
         let bridge = stretch.bridged(&r.time, &r.pressure);
         let inside = if start > 0 { start } else { end - 1 };
@@ -163,7 +169,6 @@ impl ExpectedForce {
             (Some(one), None) | (None, Some(one)) => (one, one),
             (None, None) => return false,
         };
-        let least = (NOTICEABLE.0 * self.span).max(NOTICEABLE.1 * white_noise(force));
         let mut made = 0.0;
         let undisturbed = |i: usize, pressure: f64, made: f64| {
             let base = self.force(pressure, r.stroke[i]);
