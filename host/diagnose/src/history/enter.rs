@@ -181,9 +181,9 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     diagnosis.history = Some(answer);
 }
 
-/// Probability that chance alone gives a value this many standard errors from zero, by Chebyshev's inequality: no law of errors is assumed.
-fn chance(of: &super::answer::Estimate) -> f64 {
-    of.half().map_or(1.0, |h| (h / 1.96 / of.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
+/// As [`Contrast::chance`], of the memory's share.
+fn chance(share: &super::answer::Estimate) -> f64 {
+    share.half().map_or(1.0, |h| (h / 1.96 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
 }
 
 /// The memory as an entry of what is missing.
@@ -340,7 +340,7 @@ fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
         summary: info.summary.into(),
         source: info.source.into(),
         peak_N: reading.force.abs(),
-        p: chance(&reading.estimate()),
+        p: reading.mean.chance(),
         why: Why::SlackReading { reading: reading.force, mountings: units, follows_pressure },
     });
     if diagnosis.verdict() == Verdict::Consistent {

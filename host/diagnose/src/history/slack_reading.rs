@@ -183,11 +183,12 @@ impl SlackReading {
 
     /// As a finding.
     pub(super) fn finding(&self) -> Finding {
-        let (value, mountings) = (plus_minus(&self.mean), self.mean.units);
+        let mountings = self.mean.units;
         let words = if self.effect == BenchName::CrossTalk {
             format!(
-                "while the muscle is slack, the reading of the load cell grows with the pressure, by {value} up to the highest pressure \
-                 ({mountings} mountings): it reads the pressure"
+                "while the muscle is slack, the reading of the load cell grows with the pressure: by {:.1} N up to the highest pressure where it \
+                 grows least ({mountings} mountings), which is more than a lifting tube makes: it reads the pressure",
+                self.force
             )
         } else {
             let cause = match (self.found, self.mean.mean > 0.0) {
@@ -195,12 +196,13 @@ impl SlackReading {
                 (true, true) => ": the zero of the cell is off, or a weight hangs on it",
                 (true, false) => ": the zero of the cell is off, or the slack tube pushes",
             };
+            let value = plus_minus(&self.mean);
             format!("while the muscle is slack, the load cell reads {value} ({mountings} mountings){cause}")
         };
         Finding {
             kind: FindingKind::SlackReading,
             found: self.found,
-            size: self.estimate(),
+            size: Estimate::new(self.mean.mean, self.mean.half, "N", "mounting"),
             units: mountings,
             squares: self.mean.squares,
             cause: self.found.then(|| self.effect.info().name.to_owned()),
@@ -209,10 +211,5 @@ impl SlackReading {
             run: None,
             words,
         }
-    }
-
-    /// The mean over mountings with its interval.
-    pub(super) fn estimate(&self) -> Estimate {
-        Estimate::new(self.mean.mean, self.mean.half, "N", "mounting")
     }
 }

@@ -118,7 +118,7 @@ fn unseen(h: &History) -> Figure {
     values.extend([u.supported_without.rms_pct, u.supported_with.rms_pct]);
     let places: Vec<f64> = (0..names.len()).map(|i| i as f64).collect();
     let panel = Panel::new(
-        Axis::new("error of unseen runs, root mean square, % of the largest force", "%").from_zero(),
+        Axis::new("rms error, % of the largest force", "%").from_zero(),
         Axis::names("", names.into_iter().map(String::from).collect()),
     )
     .bars("", Colour::Series(0), &values, &places);
