@@ -202,34 +202,15 @@ fn missing(judged: &Judged, share: f64) -> Missing {
     let Judged { measured, peak, .. } = judged;
     let info = measured.fault.info();
     let values = measured.parameters.iter().zip(&measured.deviations);
-    let parameters = info
-        .parameters
-        .iter()
-        .zip(values)
-        .map(|(p, (value, std))| ParameterValue {
-            name: p.name.into(),
-            value: *value,
-            std: *std,
-            unit: p.unit.into(),
-            outside_known_range: ParameterValue::is_outside(*value, p),
-        })
-        .collect();
+    let parameters = info.parameters.iter().zip(values);
+    let why = Why::Measured { check: measured.check.to_string(), value: measured.words.to_string() };
     Missing {
-        effect: info.name.into(),
-        probability: CHECKED_PROBABILITY,
-        model_weight: CHECKED_PROBABILITY,
         share_explained: share,
-        parameters,
-        confusable_with: Vec::new(),
-        place: info.link,
+        parameters: parameters.map(|(p, (value, std))| ParameterValue::of(p, *value, *std)).collect(),
         correction: true,
         checked: true,
-        given: false,
-        supported: true,
-        summary: info.summary.into(),
-        source: info.source.into(),
         peak_N: *peak,
         p: chance(measured),
-        why: Why::Measured { check: measured.check.to_string(), value: measured.words.to_string() },
+        ..Missing::of(info, CHECKED_PROBABILITY, why)
     }
 }

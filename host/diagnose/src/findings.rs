@@ -37,13 +37,7 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
                 .iter()
                 .zip(values)
                 .zip(d)
-                .map(|((p, v), std)| ParameterValue {
-                    name: p.name.into(),
-                    value: *v,
-                    std: *std,
-                    unit: p.unit.into(),
-                    outside_known_range: ParameterValue::is_outside(*v, p),
-                })
+                .map(|((p, v), std)| ParameterValue::of(p, *v, *std))
                 .collect();
             let sum: f64 = 1.0 + t.competitors.iter().map(|r| r.1).sum::<f64>();
             let model_weight = 1.0 / sum;
@@ -62,23 +56,16 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
             };
             let moment = change_point::place(candidate, &t.fit)
                 .map(|shape| change_point::of(t.fit.shapes[shape], rows));
+            let why = Why::Found(Evidence { share, chance, moment });
             Missing {
-                effect: info.name.into(),
-                probability: calibration::probability(model_weight, explained),
                 model_weight,
                 share_explained: share,
                 parameters,
                 confusable_with: confusable,
-                place: info.link,
                 correction: candidate.of_the_bench(),
-                checked: false,
-                given: false,
-                supported: true,
-                summary: info.summary.into(),
-                source: info.source.into(),
                 peak_N: t.fit.peak,
                 p: t.p,
-                why: Why::Found(Evidence { share, chance, moment }),
+                ..Missing::of(info, calibration::probability(model_weight, explained), why)
             }
         })
         .collect()

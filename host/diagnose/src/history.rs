@@ -23,7 +23,7 @@
 //! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
-//! | `enter` | the history beside what the static search says |
+//! | `enter`, `entries` | the history beside what the static search says, and its entries in the answer |
 //! | [`crate::criteria`] | every constant |
 
 pub mod answer;
@@ -31,6 +31,7 @@ pub mod answer;
 mod beside;
 mod campaign;
 mod enter;
+mod entries;
 mod findings;
 mod friction;
 mod gap;
@@ -52,7 +53,8 @@ mod tests;
 mod unseen;
 
 pub use answer::History;
-pub use enter::{diagnose, is_from_history, reliable_recordings};
+pub use enter::{diagnose, reliable_recordings};
+pub use entries::is_from_history;
 
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;

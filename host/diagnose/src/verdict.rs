@@ -3,7 +3,7 @@
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
-use model_core::effects::{Link, Parameter};
+use model_core::effects::{Info, Link, Parameter};
 use serde::Serialize;
 
 pub use crate::experiment::Proposal;
@@ -49,6 +49,17 @@ pub struct ParameterValue {
 }
 
 impl ParameterValue {
+    /// A parameter of the catalogue with its value and standard deviation, SI.
+    pub(crate) fn of(parameter: &Parameter, value: f64, std: Option<f64>) -> Self {
+        Self {
+            name: parameter.name.into(),
+            value,
+            std,
+            unit: parameter.unit.into(),
+            outside_known_range: Self::is_outside(value, parameter),
+        }
+    }
+
     /// Whether a value lies outside what the literature knows; one that is not used does not.
     #[must_use]
     pub fn is_outside(value: f64, parameter: &Parameter) -> bool {
@@ -93,6 +104,31 @@ pub struct Missing {
     pub p: f64,
     /// Why this one.
     pub why: Why,
+}
+
+impl Missing {
+    /// An effect of the catalogue, named with this probability for a reason. It explains nothing and has no parameters yet; a muscle has it,
+    /// not the bench.
+    pub(crate) fn of(info: &Info, probability: f64, why: Why) -> Self {
+        Self {
+            effect: info.name.into(),
+            probability,
+            model_weight: probability,
+            share_explained: 0.0,
+            parameters: Vec::new(),
+            confusable_with: Vec::new(),
+            place: info.link,
+            correction: false,
+            checked: false,
+            given: false,
+            supported: true,
+            summary: info.summary.into(),
+            source: info.source.into(),
+            peak_N: 0.0,
+            p: 1.0,
+            why,
+        }
+    }
 }
 
 /// What no named effect explains.

@@ -3,41 +3,20 @@
 use model_core::braid::{Braid, Geometry};
 
 use super::beside::Needed;
-use super::criteria::{
-    ENTER_EXPLAINED, ENTER_REFUTES, ENTER_RESOLVED, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN, MOST_LOST,
-};
-use super::findings::Contrast;
+use super::criteria::{ENTER_EXPLAINED, ENTER_RESOLVED, MOST_LOST};
+use super::entries::is_from_history;
 use super::slack_reading::SlackReading;
-use super::{Found, History, found};
+use super::{Found, entries, found};
 use crate::baselines::{self, Kind};
 use crate::criteria::judgement::PARTLY_EXPLAINED;
 use crate::diagnosis::diagnose as statically;
 use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;
-use crate::verdict::{
-    Considered, Diagnosis, HeldOut, Missing, Outcome, ParameterValue, Split, Verdict, Why, WhyNot,
-};
-use crate::why::{Chance, Evidence};
-use model_core::effects::{EffectName, Role};
+use crate::verdict::{Considered, Diagnosis, HeldOut, Outcome, Split, Verdict, WhyNot};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
-use pam_fit::bench::{BenchName, Candidate};
-use pam_fit::confidence_band::HALF_95;
-
-/// The memory's parameter in an answer; the catalogue's `log-creep` is driven by another load and has other parameters.
-const RELAXED_SHARE: &str = "relaxed_share";
-/// The same for `P_b`.
-const BALANCE_PRESSURE: &str = "balance_pressure";
-/// Names of the memory: one and the same to these recordings.
-const NAMES: [&str; 2] = [EffectName::LogCreep.info().name, EffectName::StressRelaxation.info().name];
-
-/// Whether an entry was found by the history layer: its parameters are not those of the catalogue's effect of that name.
-#[must_use]
-pub fn is_from_history(missing: &Missing) -> bool {
-    missing.parameters.iter().any(|p| p.name == RELAXED_SHARE)
-}
 
 /// Finds out what the model leaves out of a campaign: its history first, where it is one of isometric staircases, then the rest.
 ///
@@ -155,8 +134,8 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     let left = (1.0 - unseen.gain).clamp(0.0, 1.0);
     let resolved = unseen.supported_with.rms_N <= ENTER_RESOLVED * answer.largest_force_N;
     // What the search calls a memory in recordings freed of it is the rest of the same.
-    diagnosis.missing.retain(|m| !NAMES.contains(&m.effect.as_str()));
-    diagnosis.missing.insert(0, memory(&answer, peak));
+    diagnosis.missing.retain(|m| !entries::NAMES.contains(&m.effect.as_str()));
+    diagnosis.missing.insert(0, entries::memory(&answer, peak));
     enter_needed(diagnosis, needed.as_ref(), left);
     let freed_misfit = diagnosis.misfit_rms_N;
     let rest_agrees =
@@ -181,71 +160,6 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
     diagnosis.history = Some(answer);
 }
 
-/// As [`Contrast::chance`], of the memory's share.
-fn chance(share: &super::answer::Estimate) -> f64 {
-    share.half().map_or(1.0, |h| (h / 1.96 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
-}
-
-/// The memory as an entry of what is missing.
-fn memory(history: &History, peak: f64) -> Missing {
-    let spectrum = history.law.one_time_constant_ratio >= ENTER_REFUTES;
-    let probability = if spectrum { ENTER_SURE } else { ENTER_UNSURE };
-    let half_to_std = |e: &super::answer::Estimate, scale: f64| e.half().map(|h| scale * h / 1.96);
-    let mut parameters = vec![
-        ParameterValue {
-            name: RELAXED_SHARE.into(),
-            value: history.law.relaxed_share.value,
-            std: half_to_std(&history.law.relaxed_share, 1.0),
-            unit: String::new(),
-            outside_known_range: false,
-        },
-        ParameterValue {
-            name: BALANCE_PRESSURE.into(),
-            value: 1e3 * history.law.balance_pressure.value,
-            std: half_to_std(&history.law.balance_pressure, 1e3),
-            unit: "Pa".into(),
-            outside_known_range: false,
-        },
-    ];
-    parameters.extend(history.law.time_constants_s.iter().enumerate().map(|(k, t)| ParameterValue {
-        name: format!("time_constant_{}", k + 1),
-        value: *t,
-        // The spectrum's places are given.
-        std: Some(0.0),
-        unit: "s".into(),
-        outside_known_range: false,
-    }));
-    Missing {
-        effect: NAMES[0].into(),
-        probability,
-        model_weight: probability,
-        share_explained: history.unseen.gain.clamp(0.0, 1.0),
-        parameters,
-        confusable_with: vec![NAMES[1].into()],
-        place: EffectName::LogCreep.info().link,
-        correction: false,
-        checked: false,
-        given: false,
-        supported: true,
-        summary: "The bladder carries a part of the pressure. That part relaxes at constant length, as much in each tenfold of time, and \
-                  comes back as slowly when the muscle is vented: the next runs remember it."
-            .into(),
-        source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − 60 kPa)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
-                 linear relaxation with a flat spectrum over decades: W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear \
-                 Viscoelastic Materials, 1976"
-            .into(),
-        peak_N: peak,
-        p: chance(&history.law.relaxed_share),
-        why: Why::Memory {
-            without_pct: history.unseen.supported_without.rms_pct,
-            with_pct: history.unseen.supported_with.rms_pct,
-            gain: history.unseen.gain,
-            least_gain: LEAST_GAIN,
-            one_time_constant_ratio: history.law.one_time_constant_ratio,
-        },
-    }
-}
-
 /// An effect that unseen runs need, where the search has not named it or one that it is not distinguished from. `left` is the share of the
 /// squared error that the memory leaves.
 fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
@@ -255,7 +169,7 @@ fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
     };
     let Some(needed) = needed.filter(|n| diagnosis.judged() && !known(n)) else { return };
     let from = diagnosis.missing.iter().take_while(|m| is_from_history(m)).count();
-    diagnosis.missing.insert(from, beside_memory(needed, left));
+    diagnosis.missing.insert(from, entries::beside_memory(needed, left));
     let verdict = match diagnosis.verdict() {
         Verdict::Consistent => Verdict::Explained,
         Verdict::Unexplained if needed.gain >= PARTLY_EXPLAINED => Verdict::PartlyExplained,
@@ -264,85 +178,13 @@ fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
     diagnosis.outcome = Outcome::Judged(verdict);
 }
 
-/// An effect beside the memory as an entry of what is missing. `left` is the share of the squared error that the memory leaves.
-fn beside_memory(needed: &Needed, left: f64) -> Missing {
-    let info = needed.effect.info();
-    let probability = if needed.confusable.is_empty() { ENTER_SURE } else { ENTER_UNSURE };
-    let share = (left * needed.gain).clamp(0.0, 1.0);
-    let parameters = info.parameters.iter().enumerate().map(|(k, parameter)| {
-        let value = match parameter.role {
-            Role::Shape => needed.shape.unwrap_or(0.0),
-            Role::Amplitude if k == needed.amplitude => needed.value,
-            Role::Amplitude => 0.0,
-        };
-        ParameterValue {
-            name: parameter.name.into(),
-            value,
-            std: (k == needed.amplitude).then_some(needed.error),
-            unit: parameter.unit.into(),
-            outside_known_range: ParameterValue::is_outside(value, parameter),
-        }
-    });
-    Missing {
-        effect: info.name.into(),
-        probability,
-        model_weight: probability,
-        share_explained: share,
-        parameters: parameters.collect(),
-        confusable_with: needed.confusable.iter().map(|e| e.info().name.to_owned()).collect(),
-        place: info.link,
-        correction: matches!(needed.effect, Candidate::Bench(_)),
-        checked: false,
-        given: false,
-        supported: true,
-        summary: info.summary.into(),
-        source: info.source.into(),
-        peak_N: needed.peak,
-        p: needed.chance,
-        why: Why::Found(Evidence {
-            share,
-            chance: Chance::Tested { effects: needed.tried, p: needed.chance },
-            moment: None,
-        }),
-    }
-}
-
-/// An error of the load cell that a slack muscle shows, as an entry of what is missing. It moves no curve against another, so that it
-/// explains no share of their error.
+/// An error of the load cell that a slack muscle shows.
 fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
     if !diagnosis.judged() {
         return;
     }
-    let info = reading.effect.info();
-    diagnosis.missing.retain(|m| m.effect != info.name);
-    let Contrast { half, units, .. } = reading.mean;
-    let follows_pressure = reading.effect == BenchName::CrossTalk;
-    let parameters = info.parameters.iter().take(1).map(|parameter| ParameterValue {
-        name: parameter.name.into(),
-        value: reading.amplitude,
-        // The least of several slopes has no interval of its own.
-        std: half.filter(|_| !follows_pressure).map(|h| h / HALF_95),
-        unit: parameter.unit.into(),
-        outside_known_range: ParameterValue::is_outside(reading.amplitude, parameter),
-    });
-    diagnosis.missing.push(Missing {
-        effect: info.name.into(),
-        probability: ENTER_UNSURE,
-        model_weight: ENTER_UNSURE,
-        share_explained: 0.0,
-        parameters: parameters.collect(),
-        confusable_with: reading.confusable.iter().map(|b| b.info().name.to_owned()).collect(),
-        place: info.link,
-        correction: true,
-        checked: false,
-        given: false,
-        supported: true,
-        summary: info.summary.into(),
-        source: info.source.into(),
-        peak_N: reading.force.abs(),
-        p: reading.mean.chance(),
-        why: Why::SlackReading { reading: reading.force, mountings: units, follows_pressure },
-    });
+    diagnosis.missing.retain(|m| m.effect != reading.effect.info().name);
+    diagnosis.missing.push(entries::slack_reading(reading));
     if diagnosis.verdict() == Verdict::Consistent {
         diagnosis.outcome = Outcome::Judged(Verdict::Explained);
     }
