@@ -40,6 +40,8 @@ mod tdms;
 mod thousands;
 mod time_of_day;
 mod unit_check;
+mod usual_line;
+mod words;
 #[cfg(feature = "excel")]
 mod workbook;
 

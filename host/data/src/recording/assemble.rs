@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::blocks::Rows;
-use super::cells::{Want, Words};
+use super::cells::Want;
 use super::column_plan::{ColumnPlan, Role};
 use super::columns::Recording;
 use super::decimal;
@@ -15,6 +15,7 @@ use super::plausibility::check;
 use super::quantity::Quantity;
 use super::stroke_zero::{at_largest, first_level, smallest};
 use super::time_of_day;
+use super::words::Words;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 

@@ -11,7 +11,8 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use crate::bounds::Budget;
 use crate::error::Error;
 
-use super::cells::{Dialect, LineError, LineMap, Parsed, Wanted, Words, parse};
+use super::cells::{Dialect, LineError, LineMap, Parsed, Wanted, parse};
+use super::words::Words;
 
 /// Small enough for a block and its columns to stay in the second-level cache.
 const BLOCK: usize = 512 << 10;

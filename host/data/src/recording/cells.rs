@@ -1,9 +1,9 @@
 //! Lines of text to numbers: one block of whole lines at a time.
 
-use std::collections::HashMap;
-
 use super::decimal;
 use super::line::{Cells, is_blank, is_remark, trim_end};
+use super::usual_line::UsualLine;
+use super::words::Words;
 use crate::date::{DateOrder, time_stamp_in};
 
 /// How a text file is cut into cells.
@@ -70,46 +70,6 @@ pub(super) struct LineError {
     pub cell: Option<usize>,
     pub value: String,
     pub fault: Fault,
-}
-
-/// Texts as numbers into a vocabulary.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Words {
-    pub codes: Vec<u32>,
-    pub words: Vec<String>,
-    index: HashMap<String, u32>,
-}
-
-impl Words {
-    pub(super) fn push(&mut self, word: &str) {
-        let code = self.code(word);
-        self.codes.push(code);
-    }
-
-    fn code(&mut self, word: &str) -> u32 {
-        // Neighbouring rows mostly carry the same word.
-        if let Some(last) = self.codes.last()
-            && self.words[*last as usize] == word
-        {
-            return *last;
-        }
-        if let Some(code) = self.index.get(word) {
-            return *code;
-        }
-        let code = self.words.len() as u32;
-        self.words.push(word.to_owned());
-        self.index.insert(word.to_owned(), code);
-        code
-    }
-
-    pub(super) fn append(&mut self, other: &Self) {
-        let map: Vec<u32> = other.words.iter().map(|w| self.code(w)).collect();
-        self.codes.extend(other.codes.iter().map(|c| map[*c as usize]));
-    }
-
-    pub(super) fn get(&self, row: usize) -> &str {
-        self.codes.get(row).and_then(|c| self.words.get(*c as usize)).map_or("", String::as_str)
-    }
 }
 
 /// Which line of the file each row came from: (first row, its line), one entry wherever lines were skipped.
@@ -202,7 +162,7 @@ pub(super) fn parse(
         texts: wanted.iter().map(|_| Words::default()).collect(),
         ..Parsed::default()
     };
-    let quick = Quick::new(dialect, wanted, width);
+    let quick = UsualLine::new(dialect, wanted, width);
     let first = memchr::memchr(b'\n', block).unwrap_or(block.len()) + 1;
     for (column, wanted) in out.numbers.iter_mut().zip(wanted) {
         if wanted.want != Want::Text {
@@ -244,85 +204,6 @@ pub(super) fn parse(
         out.lines += 1;
     }
     Ok(out)
-}
-
-/// The usual line, without looking at it twice: plain numbers between delimiters. Anything else is left to [`row`].
-struct Quick<'a> {
-    delimiter: u8,
-    point: u8,
-    comment: Option<u8>,
-    /// Per column of the file, which of the requested ones it is.
-    columns: Vec<Option<(usize, f64, f64)>>,
-    wanted: &'a [Wanted],
-}
-
-impl<'a> Quick<'a> {
-    fn new(dialect: Dialect, wanted: &'a [Wanted], width: usize) -> Option<Self> {
-        let mut columns = vec![None; width];
-        for (n, wanted) in wanted.iter().enumerate() {
-            let column = columns.get_mut(wanted.index)?;
-            match (wanted.want, &column) {
-                (Want::Number { scale, offset }, None) => *column = Some((n, scale, offset)),
-                _ => return None,
-            }
-        }
-        let (delimiter, point) = (dialect.delimiter, dialect.point());
-        let usual = dialect.thousands.is_none()
-            && delimiter != b' '
-            && delimiter != point
-            && !delimiter.is_ascii_digit();
-        usual.then_some(Self { delimiter, point, comment: dialect.comment, columns, wanted })
-    }
-
-    /// The number at a place, and where it ends.
-    #[inline]
-    fn number(&self, text: &[u8], at: usize) -> Option<(f64, usize)> {
-        decimal::plain(text, at, self.point).or_else(|| {
-            let (value, used) = decimal::prefix(text.get(at..)?, self.point)?;
-            value.is_finite().then_some((value, at + used))
-        })
-    }
-
-    /// Reads a line into `values` and gives its length with its end, or `None` if it is not quite usual.
-    #[inline]
-    fn row(&self, text: &[u8], values: &mut [f64]) -> Option<usize> {
-        debug_assert_eq!(values.len(), self.wanted.len());
-        if text.first() == self.comment.as_ref() {
-            return None;
-        }
-        let mut at = 0;
-        let last = self.columns.len() - 1;
-        for (i, column) in self.columns.iter().enumerate() {
-            match column {
-                Some((n, scale, offset)) => {
-                    let (value, end) = self.number(text, at)?;
-                    *values.get_mut(*n)? = value * scale + offset;
-                    at = end;
-                }
-                None => loop {
-                    match *text.get(at)? {
-                        b if b == self.delimiter => break,
-                        b'\n' | b'\r' if i == last => break,
-                        b'\n' | b'\r' | b'"' => return None,
-                        _ => at += 1,
-                    }
-                },
-            }
-            let end = *text.get(at)?;
-            at += 1;
-            if i < last {
-                if end != self.delimiter {
-                    return None;
-                }
-            } else if end != b'\n' {
-                if end != b'\r' || *text.get(at)? != b'\n' {
-                    return None;
-                }
-                at += 1;
-            }
-        }
-        Some(at)
-    }
 }
 
 type CellError = (Option<usize>, String, Fault);

@@ -1,8 +1,9 @@
 //! Named columns as they are in a container: not yet chosen, not yet in SI.
 
 use super::blocks::Rows;
-use super::cells::{Want, Wanted, Words};
+use super::cells::{Want, Wanted};
 use super::import::Missing;
+use super::words::Words;
 use crate::date::time_stamp_in;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;

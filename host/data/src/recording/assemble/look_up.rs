@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use super::super::blocks::Rows;
-use super::super::cells::{Want, Words};
+use super::super::cells::Want;
 use super::super::column_plan::Role;
+use super::super::words::Words;
 use super::{Job, LookupTable, Table, number, same};
 use crate::date::time_stamp_in;
 use crate::error::{DataCode, Error, Result};

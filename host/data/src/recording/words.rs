@@ -1,0 +1,43 @@
+//! Columns of text: few words that repeat.
+
+use std::collections::HashMap;
+
+/// Texts as numbers into a vocabulary.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Words {
+    pub codes: Vec<u32>,
+    pub words: Vec<String>,
+    index: HashMap<String, u32>,
+}
+
+impl Words {
+    pub(super) fn push(&mut self, word: &str) {
+        let code = self.code(word);
+        self.codes.push(code);
+    }
+
+    fn code(&mut self, word: &str) -> u32 {
+        // Neighbouring rows mostly carry the same word.
+        if let Some(last) = self.codes.last()
+            && self.words[*last as usize] == word
+        {
+            return *last;
+        }
+        if let Some(code) = self.index.get(word) {
+            return *code;
+        }
+        let code = self.words.len() as u32;
+        self.words.push(word.to_owned());
+        self.index.insert(word.to_owned(), code);
+        code
+    }
+
+    pub(super) fn append(&mut self, other: &Self) {
+        let map: Vec<u32> = other.words.iter().map(|w| self.code(w)).collect();
+        self.codes.extend(other.codes.iter().map(|c| map[*c as usize]));
+    }
+
+    pub(super) fn get(&self, row: usize) -> &str {
+        self.codes.get(row).and_then(|c| self.words.get(*c as usize)).map_or("", String::as_str)
+    }
+}
