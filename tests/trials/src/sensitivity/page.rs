@@ -1,0 +1,111 @@
+//! The page of the study.
+
+use std::fmt::Write as _;
+
+use pam_diagnose::criteria::{Criterion, PAGE};
+
+use super::{GROUP, Row};
+use crate::ledger::Ledger;
+use crate::rate::Rate;
+
+/// A criterion as the page of criteria has it.
+fn criterion(name: &str) -> Option<&'static Criterion> {
+    PAGE.iter().flat_map(|s| s.criteria).find(|c| c.name == name)
+}
+
+/// The table of all criteria that change an answer, those that change none, and those that have not been measured.
+pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
+    let protocol = set.protocol.as_ref().map_or(String::new(), |p| format!(" --protocol {p}"));
+    let mut m = format!(
+        "# Sensitivity of the diagnosis to its criteria\n\n\
+         Each criterion of `host/diagnose/src/criteria` at half and at double its value, on the same trials of a development set of the \
+         virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and more whose first name is of the right class. \
+         \"Answers changed\" counts trials that name something else than with the criteria as they are.\n\n\
+         ```text\n\
+         cargo run --release -p trials -- generate --set {} --n {}{protocol} --take {} -o SET\n\
+         cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
+         ```\n\n\
+         These commands wrote this page. Criteria are scaled in groups of {GROUP} at first. Where a group changes no answer, none of its \
+         criteria is counted as changing one; this overlooks two that cancel each other. Where it changes one, the group is halved until \
+         the criteria are found that change an answer alone. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
+         on each of them, not how good they are.\n\n",
+        set.set,
+        set.drawn,
+        nominal.named.len()
+    );
+    let rate = |k: usize, n: usize| Rate::new(k, n).to_string();
+    let _ = writeln!(
+        m,
+        "With the criteria as they are: false alarms {}; class right {}; exact {}; wrong class {}; trials {}.\n",
+        rate(nominal.false_alarms, nominal.nulls),
+        rate(nominal.class_right, nominal.judged),
+        rate(nominal.exact, nominal.judged),
+        rate(nominal.wrong_class, nominal.judged),
+        nominal.named.len()
+    );
+    m.push_str(
+        "| criterion | value | false alarms at ½, ×2 | class right at ½, ×2 | exact at ½, ×2 | wrong class at ½, ×2 | answers changed at ½, ×2 |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let (mut moving, still): (Vec<_>, Vec<_>) =
+        rows.iter().partition(|(half, double)| half.changed(nominal) + double.changed(nominal) > 0);
+    moving.sort_by_key(|(half, double)| std::cmp::Reverse(half.changed(nominal) + double.changed(nominal)));
+    for (half, double) in moving {
+        let pair = |of: &dyn Fn(&Row) -> usize| format!("{}, {}", of(half), of(double));
+        let _ = writeln!(
+            m,
+            "| `{}` | {} | {} | {} | {} | {} | {} |",
+            half.criterion,
+            criterion(&half.criterion).map_or("", |c| c.value),
+            pair(&|r| r.false_alarms),
+            pair(&|r| r.class_right),
+            pair(&|r| r.exact),
+            pair(&|r| r.wrong_class),
+            pair(&|r| r.changed(nominal))
+        );
+    }
+    let names = |of: Vec<&str>| of.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+    let still: Vec<&str> = still.iter().map(|(half, _)| half.criterion.as_str()).collect();
+    let _ = writeln!(m, "\n{} of {} criteria measured change no answer.", still.len(), rows.len());
+    for (what, of) in [("Without effect", still), ("Not measured", open.iter().map(String::as_str).collect())]
+    {
+        if !of.is_empty() {
+            let _ = writeln!(m, "\n{what} ({}): {}.", of.len(), names(of));
+        }
+    }
+    m.push_str(
+        "\nNot in this study: limits of computing time, sizes of arrays, and the criteria of comparisons with a reference, of campaigns \
+         over months, of isometric runs, of proposed recordings, of the health of a table on a controller, and of stocks. Loops of the virtual \
+         bench do not reach them.\n",
+    );
+    m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::row;
+    use super::*;
+
+    #[test]
+    fn the_page_counts_changed_answers_and_lists_what_is_open() {
+        let nominal = row("nominal", 1.0, ["leak", "inertia"]);
+        let rows = [
+            (row("ALPHA", 0.5, ["leak", "backlash"]), row("ALPHA", 2.0, ["leak", "inertia"])),
+            (row("GAMMA", 0.5, ["leak", "inertia"]), row("GAMMA", 2.0, ["leak", "inertia"])),
+        ];
+        let set = Ledger {
+            set: "dev".into(),
+            seed_sha256: String::new(),
+            truths: Vec::new(),
+            drawn: 345,
+            protocol: Some("A".into()),
+            answers: Vec::new(),
+            tool: String::new(),
+            seconds: Vec::new(),
+        };
+        let page = markdown(&set, &nominal, &rows, &["BETA".into()]);
+        assert!(page.contains("generate --set dev --n 345 --protocol A --take 2 -o SET"), "{page}");
+        assert!(page.contains("| `ALPHA` |  | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
+        assert!(page.contains("Without effect (1): `GAMMA`.") && page.contains("(1): `BETA`."), "{page}");
+    }
+}
