@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pam_diagnose::criteria::{Criterion, PAGE};
+use pam_diagnose::criteria::{Criterion, PAGE, Stage};
 
 use super::{GROUP, Row};
 use crate::ledger::Ledger;
@@ -26,7 +26,7 @@ pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
          These commands wrote this page. Criteria are scaled in groups of {GROUP} at first. Where a group changes no answer, none of its \
-         criteria is counted as changing one; this overlooks two that cancel each other. Where it changes one, the group is halved until \
+         criteria is counted as changing one; this misses two that cancel each other. Where it changes one, the group is halved until \
          the criteria are found that change an answer alone. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
          on each of them, not how good they are.\n\n",
         set.set,
@@ -64,19 +64,23 @@ pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &
             pair(&|r| r.changed(nominal))
         );
     }
-    let names = |of: Vec<&str>| of.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
-    let still: Vec<&str> = still.iter().map(|(half, _)| half.criterion.as_str()).collect();
-    let _ = writeln!(m, "\n{} of {} criteria measured change no answer.", still.len(), rows.len());
-    for (what, of) in [("Without effect", still), ("Not measured", open.iter().map(String::as_str).collect())]
-    {
-        if !of.is_empty() {
-            let _ = writeln!(m, "\n{what} ({}): {}.", of.len(), names(of));
+    let _ = writeln!(m, "\n{} of {} criteria measured change no answer.\n", still.len(), rows.len());
+    m.push_str("| stage | without effect | not measured |\n| --- | --- | --- |\n");
+    let names = |stage: &Stage, of: &dyn Fn(&str) -> bool| {
+        let own = stage.criteria.iter().map(|c| c.name).filter(|name| of(name));
+        own.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    };
+    for stage in PAGE {
+        let without = names(&stage, &|name| still.iter().any(|(half, _)| half.criterion == name));
+        let not_measured = names(&stage, &|name| open.iter().any(|o| o == name));
+        if !(without.is_empty() && not_measured.is_empty()) {
+            let _ = writeln!(m, "| {} | {without} | {not_measured} |", stage.title);
         }
     }
     m.push_str(
-        "\nNot in this study: limits of computing time, sizes of arrays, and the criteria of comparisons with a reference, of campaigns \
-         over months, of isometric runs, of proposed recordings, of the health of a table on a controller, and of stocks. Loops of the virtual \
-         bench do not reach them.\n",
+        "\nNot in this study are limits of computing time and sizes of arrays. Loops of the virtual bench do not reach the criteria of \
+         comparisons with a reference, of campaigns over months, of isometric runs, of proposed recordings, of the health of a table on a \
+         controller, and of stocks.\n",
     );
     m
 }
@@ -91,7 +95,7 @@ mod tests {
         let nominal = row("nominal", 1.0, ["leak", "inertia"]);
         let rows = [
             (row("ALPHA", 0.5, ["leak", "backlash"]), row("ALPHA", 2.0, ["leak", "inertia"])),
-            (row("GAMMA", 0.5, ["leak", "inertia"]), row("GAMMA", 2.0, ["leak", "inertia"])),
+            (row("FAMILY_ALPHA", 0.5, ["leak", "inertia"]), row("FAMILY_ALPHA", 2.0, ["leak", "inertia"])),
         ];
         let set = Ledger {
             set: "dev".into(),
@@ -103,9 +107,9 @@ mod tests {
             tool: String::new(),
             seconds: Vec::new(),
         };
-        let page = markdown(&set, &nominal, &rows, &["BETA".into()]);
+        let page = markdown(&set, &nominal, &rows, &["LEAST_SCORE".into()]);
         assert!(page.contains("generate --set dev --n 345 --protocol A --take 2 -o SET"), "{page}");
         assert!(page.contains("| `ALPHA` |  | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
-        assert!(page.contains("Without effect (1): `GAMMA`.") && page.contains("(1): `BETA`."), "{page}");
+        assert!(page.contains("| `FAMILY_ALPHA` | `LEAST_SCORE` |"), "{page}");
     }
 }
