@@ -78,9 +78,9 @@ pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &
         }
     }
     m.push_str(
-        "\nNot in this study are limits of computing time and sizes of arrays. Loops of the virtual bench do not reach the criteria of \
-         comparisons with a reference, of campaigns over months, of isometric runs, of proposed recordings, of the health of a table on a \
-         controller, and of stocks.\n",
+        "\nNot in this study are limits of computing time and sizes of arrays. Loops of the virtual bench do not reach criteria of comparisons \
+         with a reference, campaigns over months, isometric runs, and stocks. Nor do they reach those of proposed recordings and of a \
+         table's health on a controller.\n",
     );
     m
 }
