@@ -22,16 +22,11 @@ import numpy as np  # noqa: E402
 import polars as pl  # noqa: E402
 
 import muscle  # noqa: E402
-from measure import COSTS, Bound, finish, rounds  # noqa: E402
+from measure import COSTS, Bound, finish, peer, rounds  # noqa: E402
 
 DATA = environment.ROOT.parent / "shared" / "data"
 MUSCLES = environment.ROOT / "examples" / "muscles"
 ROUNDS = 3
-READ = """import polars, sys, time
-wall, processor = time.perf_counter(), time.process_time()
-polars.read_csv(sys.argv[1], {0})
-print(time.perf_counter() - wall, time.process_time() - processor)
-"""
 
 
 @dataclass
@@ -54,12 +49,7 @@ def loops(rng, rows):
 
 def repeated(rng, rows):
     """Six short loops that repeat; the pressure jumps where a loop begins, and one reading in a thousand is an outlier."""
-    size = 3000
-    times = -(-rows // (6 * size))
-    x, force = (np.tile(np.concatenate(c), times)[:rows] for c in zip(*[muscle.loop(p, size) for p in muscle.LEVELS]))
-    p = np.tile(np.repeat(muscle.LEVELS, size), times)[:rows]
-    force = force + np.where(rng.random(rows) < 1e-3, 20 * rng.standard_normal(rows), 0)
-    return Made(muscle.columns(rng, 0.025 * np.arange(rows), p, x, force))
+    return Made(muscle.repeated(rng, rows))
 
 
 def held(rng, rows, levels):
@@ -191,7 +181,7 @@ def main() -> None:
             fit = [host, "fit", "--quiet", "--force", "--muscle", described, path, "-o", folder / "table.pam"]
             programs = {
                 "host fit": (fit, False),
-                "polars, reading only": ([sys.executable, "-c", READ.format(read), path], True),
+                "polars, reading only": peer("polars", path, read),
             }
             costs = rounds(programs, ROUNDS)
             size = path.stat().st_size / 1e6

@@ -12,7 +12,7 @@ HERE = Path(__file__).resolve().parent
 # A reader in a separate process reports the time of reading alone, without the start of Python and imports.
 PEER = """import {0} as m, sys, time
 wall, processor = time.perf_counter(), time.process_time()
-m.read_csv(sys.argv[1])
+m.read_csv(sys.argv[1]{1})
 print(time.perf_counter() - wall, time.process_time() - processor)
 """
 
@@ -65,8 +65,9 @@ def rounds(programs: dict[str, tuple[list[str], bool]], count: int) -> dict[str,
     return best
 
 
-def peer(module: str, path: Path) -> tuple[list[str], bool]:
-    return ([sys.executable, "-c", PEER.format(module), str(path)], True)
+def peer(module: str, path: Path, options: str = "") -> tuple[list[str], bool]:
+    """Reading by a module; `options` are further arguments of its `read_csv`."""
+    return ([sys.executable, "-c", PEER.format(module, f", {options}"), str(path)], True)
 
 
 def make(path: Path, rows: int, *kind: str) -> float:

@@ -82,19 +82,22 @@ def write(path: Path, rows: int) -> None:
     pl.concat([pl.DataFrame(b) for b in blocks]).write_csv(path)
 
 
-def write_repeated(path: Path, rows: int) -> None:
-    """Six loops of 3000 rows each, one after another until the file is full: time goes on, and the pressure jumps where a loop begins.
-    One reading of the force in a thousand is an outlier."""
-    import polars as pl
-
-    rng = np.random.default_rng(3)
+def repeated(rng, rows: int) -> dict:
+    """Columns of six loops of 3000 rows each, one after another until the file is full: time goes on, and the pressure jumps where a loop
+    begins. One reading of the force in a thousand is an outlier."""
     size = 3000
     loops = [loop(p, size) for p in LEVELS]
     times = -(-rows // (size * len(LEVELS)))
     x, force = (np.tile(np.concatenate(c), times)[:rows] for c in zip(*loops))
     p = np.tile(np.repeat(LEVELS, size), times)[:rows]
     force = force + np.where(rng.random(rows) < 1e-3, 20 * rng.standard_normal(rows), 0)
-    pl.DataFrame(columns(rng, 0.025 * np.arange(rows), p, x, force)).write_csv(path)
+    return columns(rng, 0.025 * np.arange(rows), p, x, force)
+
+
+def write_repeated(path: Path, rows: int) -> None:
+    import polars as pl
+
+    pl.DataFrame(repeated(np.random.default_rng(3), rows)).write_csv(path)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ use super::criteria::selection::{
 use super::intervals::deviations;
 use super::linear::energy;
 use super::rows::Rows;
-use super::selection_step::Selection;
+use super::selection_step::{self, Selection};
 use super::verdict::{Considered, Missing, ParameterValue, Why, WhyNot};
 use super::why::{Chance, Evidence};
 
@@ -39,8 +39,7 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
                 .zip(d)
                 .map(|((p, v), std)| ParameterValue::of(p, *v, *std))
                 .collect();
-            let sum: f64 = 1.0 + t.competitors.iter().map(|r| r.1).sum::<f64>();
-            let model_weight = 1.0 / sum;
+            let model_weight = selection_step::model_weight(&t.competitors);
             let confusable: Vec<String> = t
                 .competitors
                 .iter()

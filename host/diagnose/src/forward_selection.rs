@@ -21,7 +21,8 @@ use super::noise::{self, Noise};
 use super::remark::{Refusal, Remark};
 use super::rows::{ORDERS, Rows};
 use super::selection_step::{
-    JointFit, SelectedEffect, Selection, best_of_each, competitors, is_selectable, refit, scan_step,
+    JointFit, SelectedEffect, Selection, best_of_each, competitors, is_selectable, model_weight, refit,
+    scan_step,
 };
 
 /// Selects the effects that are missing. Candidates in `refused` are scored and may compete, but are not selected.
@@ -151,8 +152,7 @@ impl<'a> ForwardSelection<'a> {
             .filter(|r| r.1 > CONFUSABLE)
             .map(|r| self.library[r.0].name().to_owned())
             .collect();
-        let weight = 1.0 / (1.0 + competitors.iter().map(|r| r.1).sum::<f64>());
-        if open.len() > MOST_COMPETITORS || weight < CONFUSABLE {
+        if open.len() > MOST_COMPETITORS || model_weight(&competitors) < CONFUSABLE {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
                 why: Refusal::Competitors { share: self.of_rest(&winner).min(1.0), others: open },

@@ -222,6 +222,11 @@ fn is_visible_beyond_tables(
     selected >= LEAST_SHARE * excess_energy && selected >= weight * (SELECTION_FLOOR * blocked).powi(2)
 }
 
+/// The weight of an effect among its competitors, whose weights are against its own.
+pub(crate) fn model_weight(competitors: &[(usize, f64, f64)]) -> f64 {
+    1.0 / (1.0 + competitors.iter().map(|r| r.1).sum::<f64>())
+}
+
 /// The weight of each competitor against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
 pub(crate) fn competitors(
