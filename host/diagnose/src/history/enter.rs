@@ -39,22 +39,20 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         diagnosis.history = Some(found.answer);
         return Ok(diagnosis);
     }
-    let zero = found.slack_reading.clone().filter(|reading| reading.found);
+    let slack_reading = found.slack_reading.clone();
+    let slack_reading = slack_reading.as_ref();
     if !found.answer.named {
-        let mut diagnosis = statically(&corrected(campaign.clone(), zero.as_ref()), geometry, options)?;
+        let mut diagnosis = statically(&corrected(campaign.clone(), slack_reading), geometry, options)?;
         enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
-        zero.iter().for_each(|reading| enter_zero(&mut diagnosis, reading));
-        update_considered(&mut diagnosis, found.slack_reading.as_ref());
+        enter_slack_reading(&mut diagnosis, slack_reading);
         diagnosis.history = Some(found.answer);
         return Ok(diagnosis);
     }
-    let slack_reading = found.slack_reading.clone();
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
-    let freed = corrected(without_memory(&reliable, &found), zero.as_ref());
+    let freed = corrected(without_memory(&reliable, &found), slack_reading);
     let mut diagnosis = statically(&freed, geometry, options)?;
     enter(&mut diagnosis, found);
-    zero.iter().for_each(|reading| enter_zero(&mut diagnosis, reading));
-    update_considered(&mut diagnosis, slack_reading.as_ref());
+    enter_slack_reading(&mut diagnosis, slack_reading);
     // The failures were taken out before.
     if let Some(failures) = screened.remark() {
         diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
@@ -109,7 +107,7 @@ fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
 
 /// The recordings without what the load cell reads of a slack muscle.
 fn corrected(mut campaign: Campaign, reading: Option<&SlackReading>) -> Campaign {
-    let Some(reading) = reading else { return campaign };
+    let Some(reading) = reading.filter(|r| r.found) else { return campaign };
     let (zero, per_pressure) = (reading.zero(), reading.per_pressure());
     for recording in &mut campaign.recordings {
         for (force, pressure) in recording.force.iter_mut().flatten().zip(&recording.pressure) {
@@ -178,20 +176,16 @@ fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
     diagnosis.outcome = Outcome::Judged(verdict);
 }
 
-/// An error of the load cell that a slack muscle shows.
-fn enter_zero(diagnosis: &mut Diagnosis, reading: &SlackReading) {
-    if !diagnosis.judged() {
-        return;
+/// What a slack muscle shows: an error of the load cell, and limits of others. What is named now is not among the effects that were
+/// considered.
+fn enter_slack_reading(diagnosis: &mut Diagnosis, reading: Option<&SlackReading>) {
+    if let Some(reading) = reading.filter(|r| r.found && diagnosis.judged()) {
+        diagnosis.missing.retain(|m| m.effect != reading.effect.info().name);
+        diagnosis.missing.push(entries::slack_reading(reading));
+        if diagnosis.verdict() == Verdict::Consistent {
+            diagnosis.outcome = Outcome::Judged(Verdict::Explained);
+        }
     }
-    diagnosis.missing.retain(|m| m.effect != reading.effect.info().name);
-    diagnosis.missing.push(entries::slack_reading(reading));
-    if diagnosis.verdict() == Verdict::Consistent {
-        diagnosis.outcome = Outcome::Judged(Verdict::Explained);
-    }
-}
-
-/// Takes what is named now out of the effects that were considered, and limits those by what a slack muscle shows.
-fn update_considered(diagnosis: &mut Diagnosis, reading: Option<&SlackReading>) {
     let missing = &diagnosis.missing;
     diagnosis.considered.retain(|c| missing.iter().all(|m| m.effect != c.effect));
     for (effect, limit) in reading.iter().flat_map(|r| &r.limits) {

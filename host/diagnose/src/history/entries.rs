@@ -8,7 +8,7 @@ use super::History;
 use super::answer::Estimate;
 use super::beside::Needed;
 use super::criteria::{ENTER_REFUTES, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN};
-use super::findings::Contrast;
+use super::findings::{Contrast, chance};
 use super::slack_reading::SlackReading;
 use crate::verdict::{Missing, ParameterValue, Why};
 use crate::why::{Chance, Evidence};
@@ -27,28 +27,23 @@ pub fn is_from_history(missing: &Missing) -> bool {
     missing.parameters.iter().any(|p| p.name == RELAXED_SHARE)
 }
 
-/// As [`Contrast::chance`], of the memory's share.
-fn chance(share: &Estimate) -> f64 {
-    share.half().map_or(1.0, |h| (h / HALF_95 / share.value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
-}
-
 /// The memory as an entry of what is missing.
 pub(super) fn memory(history: &History, peak: f64) -> Missing {
     let spectrum = history.law.one_time_constant_ratio >= ENTER_REFUTES;
     let probability = if spectrum { ENTER_SURE } else { ENTER_UNSURE };
-    let half_to_std = |e: &Estimate, scale: f64| e.half().map(|h| scale * h / HALF_95);
+    let error = |e: &Estimate| e.half().map(|h| h / HALF_95);
     let mut parameters = vec![
         ParameterValue {
             name: RELAXED_SHARE.into(),
             value: history.law.relaxed_share.value,
-            std: half_to_std(&history.law.relaxed_share, 1.0),
+            std: error(&history.law.relaxed_share),
             unit: String::new(),
             outside_known_range: false,
         },
         ParameterValue {
             name: BALANCE_PRESSURE.into(),
             value: 1e3 * history.law.balance_pressure.value,
-            std: half_to_std(&history.law.balance_pressure, 1e3),
+            std: history.law.balance_pressure.half().map(|h| 1e3 * h / HALF_95),
             unit: "Pa".into(),
             outside_known_range: false,
         },
@@ -80,7 +75,7 @@ pub(super) fn memory(history: &History, peak: f64) -> Missing {
                  Viscoelastic Materials, 1976"
             .into(),
         peak_N: peak,
-        p: chance(&history.law.relaxed_share),
+        p: chance(history.law.relaxed_share.value, error(&history.law.relaxed_share)),
         ..Missing::of(EffectName::LogCreep.info(), probability, why)
     }
 }

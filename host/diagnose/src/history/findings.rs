@@ -30,17 +30,20 @@ impl Contrast {
         Some(Self { mean, half, units: n, squares })
     }
 
-    /// Probability that chance alone gives a mean this many standard errors from zero, by Chebyshev's inequality: no law of errors is
-    /// assumed.
+    /// As [`chance`], of the mean.
     pub(super) fn chance(&self) -> f64 {
-        let error = self.half.map(|half| half / half_width_95(self.units - 1));
-        error.map_or(1.0, |error| (error / self.mean.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
+        chance(self.mean, self.half.map(|half| half / half_width_95(self.units - 1)))
     }
 
     /// Whether the interval lies above zero.
     pub(super) fn is_positive(&self) -> bool {
         self.half.is_some_and(|h| self.mean > h)
     }
+}
+
+/// Probability that chance alone gives a value this many standard errors from zero, by Chebyshev's inequality: no law of errors is assumed.
+pub(super) fn chance(value: f64, error: Option<f64>) -> f64 {
+    error.map_or(1.0, |error| (error / value.abs().max(f64::MIN_POSITIVE)).powi(2).min(1.0))
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
