@@ -40,16 +40,11 @@ pub(super) fn select_and_confirm(
                 break;
             }
         }
-        let first = selection.selected.first().map(|t| t.fit.candidate);
-        let (mut selection, held) = match failed {
-            Some(_) if refused.len() < MOST_REFUSED => (selection, None),
+        let (mut selection, again, held) = match failed {
+            Some(_) if refused.len() < MOST_REFUSED => (selection, failed, None),
             _ => drop_what_does_not_help(selection, library),
         };
         remarks.append(&mut selection.remarks);
-        let again = match held {
-            None => failed,
-            Some(_) => first.filter(|_| selection.selected.is_empty()),
-        };
         match (again, held) {
             (Some(candidate), _) if refused.len() < MOST_REFUSED => {
                 refused.push(candidate);
@@ -111,18 +106,28 @@ fn refuse(mut selection: Selection, place: usize, why: Refusal, library: &[Candi
     selection.without(place, library)
 }
 
-/// Drops effects, the last selected first, that do not reduce the error on held-out rows; gives that error.
-fn drop_what_does_not_help(mut selection: Selection, library: &[Candidate]) -> (Selection, Option<HeldOut>) {
+/// Drops effects, the last selected first, that do not reduce the error on held-out rows, and others without which it is lower. Gives the
+/// candidate without which the search should be repeated, because it may have kept others out, and that error.
+fn drop_what_does_not_help(
+    mut selection: Selection,
+    library: &[Candidate],
+) -> (Selection, Option<usize>, Option<HeldOut>) {
+    let first = selection.selected.first().map(|t| t.fit.candidate);
+    let mut harmful = None;
     loop {
         let unseen = HeldOutRows::new(&selection.rows, selection.joint.kind, &selection.traces);
         let held = unseen.held_out(&selection.traces, selection.noise.sigma);
-        let Some(last) = selection.traces.len().checked_sub(1) else { return (selection, Some(held)) };
+        let Some(last) = selection.traces.len().checked_sub(1) else {
+            return (selection, harmful.or(first), Some(held));
+        };
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
         let tested = selection.selected[last].p <= FAMILY_ALPHA;
         let (without, with, helps) = unseen.last_helps(&selection.traces, tested);
-        if helps {
-            return (selection, Some(held));
+        let failed = if helps { unseen.harmful(&selection.traces) } else { Some((last, without, with)) };
+        let Some((place, without, with)) = failed else { return (selection, harmful, Some(held)) };
+        if place != last {
+            harmful = harmful.or(Some(selection.selected[place].fit.candidate));
         }
-        selection = refuse(selection, last, Refusal::NotConfirmed { without, with }, library);
+        selection = refuse(selection, place, Refusal::NotConfirmed { without, with }, library);
     }
 }

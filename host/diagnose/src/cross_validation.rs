@@ -282,6 +282,19 @@ impl HeldOutRows {
         (without, with, with < HELD_OUT_LEAVES * without && (tested || is_lower(&before, &after)))
     }
 
+    /// The last effect, but for the very last, without which the others predict held-out rows better; with the errors without it and with
+    /// it, N.
+    pub(super) fn harmful(&self, traces: &[Vec<f64>]) -> Option<(usize, f64, f64)> {
+        let others = traces.len().saturating_sub(1);
+        let with = if others > 0 { self.error(traces) } else { return None };
+        (0..others).rev().find_map(|place| {
+            let left: Vec<Vec<f64>> =
+                traces.iter().enumerate().filter(|(i, _)| *i != place).map(|(_, t)| t.clone()).collect();
+            let without = self.error(&left);
+            (without < with).then_some((place, without, with))
+        })
+    }
+
     /// The error on the sure rows that were left out, with effects of these traces, N.
     pub(super) fn error(&self, traces: &[Vec<f64>]) -> f64 {
         self.errors(traces)[0]
@@ -367,5 +380,25 @@ mod tests {
         let shifted = rows.with_force(rows.force.iter().zip(&trace).map(|(f, t)| f + t).collect());
         let held = HeldOutRows::new(&shifted, Kind::Stiff, std::slice::from_ref(&trace));
         assert!(!held.last_helps(std::slice::from_ref(&trace), true).2);
+    }
+
+    #[test]
+    fn an_earlier_effect_that_raises_the_held_out_error_is_found() {
+        let braid = geometry().build().expect("a braid");
+        let (rows, _) = prepare(&isometric(), &braid).expect("rows");
+        let wave = |i: usize, frequency: f64| 10.0 * (frequency * rows.contexts()[i].time).sin();
+        let all = |f: &dyn Fn(usize) -> f64| (0..rows.len()).map(f).collect::<Vec<f64>>();
+        // One wave is in every recording; the other in the first one only, though its trace has it in all, with alternating signs.
+        let sign = |i: usize| if rows.recording[i] % 2 == 0 { 1.0 } else { -1.0 };
+        let by_chance = all(&|i| sign(i) * wave(i, 0.7));
+        let founded = all(&|i| wave(i, 0.3));
+        let extra = |i: usize| founded[i] + if rows.recording[i] == 0 { by_chance[i] } else { 0.0 };
+        let shifted = rows.with_force((0..rows.len()).map(|i| rows.force[i] + extra(i)).collect());
+        let held = HeldOutRows::new(&shifted, Kind::Stiff, &[]);
+        let (place, without, with) =
+            held.harmful(&[by_chance.clone(), founded.clone()]).expect("the first one does harm");
+        assert!(place == 0 && without < with, "{place}: {without} N without it, {with} N with it");
+        assert_eq!(held.harmful(&[founded.clone(), by_chance]), None, "the first one helps");
+        assert_eq!(held.harmful(&[founded]), None, "one effect is the last one");
     }
 }
