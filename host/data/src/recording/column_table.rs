@@ -64,22 +64,10 @@ pub(super) fn without_common_prefix(mut table: ColumnTable) -> ColumnTable {
 pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -> Result<Rows> {
     let mut rows = Rows::default();
     let keep = if missing == Missing::Skip { complete(table, wanted) } else { None };
-    let kept = |row: &usize| keep.as_ref().is_none_or(|k| k.get(*row).copied().unwrap_or(true));
     let mut length: Option<(usize, &str)> = None;
     for wanted in wanted {
         let Some((name, column)) = table.get(wanted.index) else { continue };
-        let count = match column {
-            Column::Numbers(n) => n.len(),
-            Column::Texts(t) => t.len(),
-            Column::Other(what) => {
-                return Err(Error::new(
-                    DataCode::RecordingNotANumber,
-                    format!("a column of {what} where numbers are needed"),
-                )
-                .column(name)
-                .help("save the column as numbers, in the unit that its name says"));
-            }
-        };
+        let count = column.rows().map_err(|e| e.column(name))?;
         match length {
             Some((n, first)) if n != count => {
                 return Err(Error::new(
@@ -91,60 +79,15 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
             _ => length = Some((count, name)),
         }
         let (mut numbers, mut words) = (Vec::new(), Words::default());
-        match (wanted.want, column) {
-            (Want::Number { scale, offset }, Column::Numbers(values)) => {
-                let bad = values.iter().enumerate().position(|(row, v)| !v.is_finite() && kept(&row));
-                if let Some(row) = bad {
-                    return Err(Error::new(DataCode::RecordingNotFinite, "not a finite number")
-                        .line(row as u64 + 1)
-                        .column(name)
-                        .value(values[row].to_string())
-                        .help("leave such rows out by --missing skip (missing = \"skip\" in an import description)"));
-                }
-                let values = values.iter().enumerate().filter(|(row, _)| kept(row));
-                numbers = values.map(|(_, v)| v * scale + offset).collect();
+        match wanted.want {
+            Want::Number { scale, offset } => {
+                numbers = in_si(column, scale, offset, keep.as_deref()).map_err(|e| e.column(name))?;
             }
-            (Want::Stamp { scale, offset, order }, Column::Texts(texts)) => {
-                let texts = texts.iter().enumerate().filter(|(row, _)| kept(row));
-                let stamp = |(row, text): (usize, &String)| {
-                    let seconds = time_stamp_in(text, order).ok_or_else(|| {
-                        Error::new(DataCode::RecordingNotANumber, "not a time stamp")
-                            .line(row as u64 + 1)
-                            .column(name)
-                            .value(text)
-                            .help("time stamps are like 2026-11-21T13:30:00.25, or 13:30:00.25")
-                    })?;
-                    Ok(seconds * scale + offset)
-                };
-                numbers = texts.map(stamp).collect::<Result<_>>()?;
+            Want::Stamp { scale, offset, order } => {
+                let seconds = |text: &str| time_stamp_in(text, order).map(|v| v * scale + offset);
+                numbers = times(column, seconds, keep.as_deref()).map_err(|e| e.column(name))?;
             }
-            (Want::Stamp { .. }, Column::Numbers(values)) => {
-                return Err(Error::new(
-                    DataCode::RecordingNotANumber,
-                    "a column of numbers where time stamps are needed",
-                )
-                .column(name)
-                .value(values.first().map_or(String::new(), f64::to_string))
-                .help("give the unit of the numbers in the import description: s or ms"));
-            }
-            (Want::Number { .. }, Column::Texts(texts)) => {
-                return Err(Error::new(
-                    DataCode::RecordingNotANumber,
-                    "a column of text where numbers are needed",
-                )
-                .column(name)
-                .value(texts.first().map_or("", String::as_str))
-                .help("save the column as numbers"));
-            }
-            (Want::Text, Column::Numbers(values)) => {
-                let values = values.iter().enumerate().filter(|(row, _)| kept(row));
-                values.for_each(|(_, v)| words.push(&v.to_string()));
-            }
-            (Want::Text, Column::Texts(texts)) => {
-                let texts = texts.iter().enumerate().filter(|(row, _)| kept(row));
-                texts.for_each(|(_, t)| words.push(t));
-            }
-            (_, Column::Other(_)) => {}
+            Want::Text => words = as_words(column, keep.as_deref()),
         }
         rows.numbers.push(numbers);
         rows.texts.push(words);
@@ -154,6 +97,84 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
         rows.leave_out(keep);
     }
     Ok(rows)
+}
+
+impl Column {
+    fn rows(&self) -> Result<usize> {
+        match self {
+            Self::Numbers(n) => Ok(n.len()),
+            Self::Texts(t) => Ok(t.len()),
+            Self::Other(what) => Err(Error::new(
+                DataCode::RecordingNotANumber,
+                format!("a column of {what} where numbers are needed"),
+            )
+            .help("save the column as numbers, in the unit that its name says")),
+        }
+    }
+}
+
+/// The values of the rows that are kept, with their places.
+fn kept<'a, T>(values: &'a [T], keep: Option<&'a [bool]>) -> impl Iterator<Item = (usize, &'a T)> {
+    let is_kept = move |row: usize| keep.is_none_or(|k| k.get(row).copied().unwrap_or(true));
+    values.iter().enumerate().filter(move |(row, _)| is_kept(*row))
+}
+
+/// Numbers, scaled.
+fn in_si(column: &Column, scale: f64, offset: f64, keep: Option<&[bool]>) -> Result<Vec<f64>> {
+    match column {
+        Column::Numbers(values) => match kept(values, keep).find(|(_, v)| !v.is_finite()) {
+            None => Ok(kept(values, keep).map(|(_, v)| v * scale + offset).collect()),
+            Some((row, value)) => Err(Error::new(DataCode::RecordingNotFinite, "not a finite number")
+                .line(row as u64 + 1)
+                .value(value.to_string())
+                .help("leave such rows out by --missing skip (missing = \"skip\" in an import description)")),
+        },
+        Column::Texts(texts) => Err(Error::new(
+            DataCode::RecordingNotANumber,
+            "a column of text where numbers are needed",
+        )
+        .value(texts.first().map_or("", String::as_str))
+        .help("save the column as numbers")),
+        Column::Other(_) => Ok(Vec::new()),
+    }
+}
+
+/// Times of time stamps.
+fn times(
+    column: &Column,
+    seconds: impl Fn(&str) -> Option<f64>,
+    keep: Option<&[bool]>,
+) -> Result<Vec<f64>> {
+    match column {
+        Column::Texts(texts) => kept(texts, keep)
+            .map(|(row, text)| {
+                seconds(text).ok_or_else(|| {
+                    Error::new(DataCode::RecordingNotANumber, "not a time stamp")
+                        .line(row as u64 + 1)
+                        .value(text)
+                        .help("time stamps are like 2026-11-21T13:30:00.25, or 13:30:00.25")
+                })
+            })
+            .collect(),
+        Column::Numbers(values) => Err(Error::new(
+            DataCode::RecordingNotANumber,
+            "a column of numbers where time stamps are needed",
+        )
+        .value(values.first().map_or(String::new(), f64::to_string))
+        .help("give the unit of the numbers in the import description: s or ms")),
+        Column::Other(_) => Ok(Vec::new()),
+    }
+}
+
+/// The cells as words.
+fn as_words(column: &Column, keep: Option<&[bool]>) -> Words {
+    let mut words = Words::default();
+    match column {
+        Column::Numbers(values) => kept(values, keep).for_each(|(_, v)| words.push(&v.to_string())),
+        Column::Texts(texts) => kept(texts, keep).for_each(|(_, t)| words.push(t)),
+        Column::Other(_) => {}
+    }
+    words
 }
 
 /// Which rows have a finite number in every requested column of numbers; `None` where all have.

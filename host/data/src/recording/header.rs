@@ -24,113 +24,128 @@ impl Header {
     pub(super) fn read(text: &[u8], import: &Import) -> Result<Self> {
         let mut header = Self::find(text, import)?;
         let above = text[..header.bytes].split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end);
-        let told = |line: &&[u8]| !line.is_empty() && !is_remark(line, header.dialect.comment);
-        header.head = above.filter(told).map(<[u8]>::to_vec).collect();
+        let has_content = |line: &&[u8]| !line.is_empty() && !is_remark(line, header.dialect.comment);
+        header.head = above.filter(has_content).map(<[u8]>::to_vec).collect();
         Ok(header)
     }
 
     fn find(text: &[u8], import: &Import) -> Result<Self> {
-        let comment = import.comment.and_then(|c| u8::try_from(c).ok());
-        let mut bytes = 0;
-        let mut lines = 0;
-        let mut skipped = 0;
-        let mut told = None;
-        let mut remark: &[u8] = &[];
-        loop {
-            let rest = &text[bytes..];
-            if rest.is_empty() {
-                let cause = format!("the file ends within its first {}", pluralise(lines, "line"));
-                return Err(Error::new(DataCode::RecordingTooShort, cause)
-                    .help("see skip_lines in the import description"));
-            }
-            let end = line_end(rest);
-            let line = rest[..end].trim_ascii_end();
-            let remarked = is_remark(line, comment);
-            // Spreadsheets tell each other the delimiter in a first line of its own.
-            let telling = line.strip_prefix(b"sep=").filter(|d| d.len() == 1 && lines == 0);
-            if let Some([delimiter]) = telling {
-                told = Some(*delimiter);
-            }
-            if remarked {
-                remark = &line.trim_ascii_start()[1..];
-            }
-            if skipped < import.skip_lines || line.is_empty() || remarked || telling.is_some() {
-                skipped += 1;
-                bytes += end;
-                lines += 1;
-                continue;
-            }
-            let line = if line.contains(&b'\r') { Err(mac_lines()) } else { Ok(line) }?;
-            let delimiter = import.delimiter()?.or(told).unwrap_or_else(|| guess_delimiter(line, import));
-            let thousands = import.thousands()?;
-            let with_row = |rows: &[u8]| {
-                let row = rows.split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty());
-                let commas = delimiter != b','
-                    && thousands != Some(b',')
-                    && has_decimal_commas(row.unwrap_or_default(), delimiter);
-                Dialect {
-                    delimiter,
-                    comment,
-                    decimal_comma: import.decimal == Decimal::Comma || commas,
-                    thousands,
-                    skip_missing: import.missing == Missing::Skip,
-                }
-            };
-            let dialect = with_row(&rest[end..]);
-            let split = |line: &[u8]| {
-                Cells::split(line, dialect).map_err(|()| {
-                    Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed")
-                        .line(lines + 1)
-                })
-            };
-            let cells = split(line)?;
-            if import.header == Some(false) {
-                let names = (1..=cells.len()).map(|n| n.to_string()).collect();
-                return Ok(Self { dialect, names, preamble: bytes, bytes, lines, head: Vec::new() });
-            }
-            let numbers = cells.iter().filter(|c| c.parse::<f64>().is_ok()).count();
-            if numbers > 0 && numbers == cells.len() {
-                // Some programs write the names as a remark.
-                let names = split(remark.trim_ascii())?;
-                if names.len() == cells.len() && names.iter().any(|n| named(n) != Named::Other) {
-                    return Ok(Self { dialect, names, preamble: bytes, bytes, lines, head: Vec::new() });
-                }
-                return Err(Error::new(DataCode::RecordingMissingColumn, "the file has no header line")
-                    .line(lines + 1)
-                    .value(String::from_utf8_lossy(&line[..line.len().min(100)]))
-                    .help(
-                        "put names with units above the numbers, such as `time_s,pressure_kPa,displacement_mm,force_N`, \
-                         or describe the columns by number in an import description (--import)",
-                    ));
-            }
-            let (bytes_here, below) = (bytes + end, &text[bytes + end..]);
-            let units = &below[..line_end(below)];
-            if let Some(names) = with_units(&cells, &split(units.trim_ascii_end())?) {
-                let (bytes, lines) = (bytes_here + units.len(), lines + 2);
-                let dialect = with_row(&below[units.len()..]);
-                return Ok(Self {
-                    dialect,
-                    names,
-                    preamble: bytes_here - end,
-                    bytes,
-                    lines,
-                    head: Vec::new(),
-                });
-            }
-            return Ok(Self {
-                dialect,
-                names: cells,
-                preamble: bytes,
-                bytes: bytes_here,
-                lines: lines + 1,
-                head: Vec::new(),
-            });
+        let first = FirstLine::find(text, import)?;
+        let below = &text[first.end..];
+        let dialect = first.dialect(import, below)?;
+        let cells = first.split(first.line, dialect)?;
+        let (start, end) = ((first.start, first.number - 1), (first.end, first.number));
+        let header = |dialect, names, (bytes, lines)| Self {
+            dialect,
+            names,
+            head: Vec::new(),
+            preamble: first.start,
+            bytes,
+            lines,
+        };
+        if import.header == Some(false) {
+            let names = (1..=cells.len()).map(|n| n.to_string()).collect();
+            return Ok(header(dialect, names, start));
         }
+        if !cells.is_empty() && cells.iter().all(|c| c.parse::<f64>().is_ok()) {
+            return Ok(header(dialect, first.names_in_remark(cells.len(), dialect)?, start));
+        }
+        let units = &below[..line_end(below)];
+        if let Some(names) = with_units(&cells, &first.split(units.trim_ascii_end(), dialect)?) {
+            let end = (first.end + units.len(), first.number + 1);
+            return Ok(header(first.dialect(import, &below[units.len()..])?, names, end));
+        }
+        Ok(header(dialect, cells, end))
     }
 
     /// For streams of unknown size: none; the estimate is only for reserving memory.
     pub(super) fn average_line(&self, rest: &[u8]) -> Option<u64> {
         (rest.len() < 65_536).then_some(rest.len() as u64)
+    }
+}
+
+/// The first line of a file that is not skipped, and what the lines above it say.
+struct FirstLine<'a> {
+    /// Its text, without its end.
+    line: &'a [u8],
+    /// Its place in the file, and that of the line below, in bytes.
+    start: usize,
+    end: usize,
+    /// Its number, counted from 1.
+    number: u64,
+    /// The delimiter that a line `sep=;` of a spreadsheet names.
+    stated_delimiter: Option<u8>,
+    /// The last remark above it.
+    remark: &'a [u8],
+}
+
+impl<'a> FirstLine<'a> {
+    fn find(text: &'a [u8], import: &Import) -> Result<Self> {
+        let comment = import.comment.and_then(|c| u8::try_from(c).ok());
+        let (mut start, mut number) = (0, 1);
+        let (mut stated_delimiter, mut remark): (_, &[u8]) = (None, &[]);
+        loop {
+            let rest = &text[start..];
+            if rest.is_empty() {
+                let cause = format!("the file ends within its first {}", pluralise(number - 1, "line"));
+                return Err(Error::new(DataCode::RecordingTooShort, cause)
+                    .help("see skip_lines in the import description"));
+            }
+            let end = start + line_end(rest);
+            let line = text[start..end].trim_ascii_end();
+            let is_remark = is_remark(line, comment);
+            let separator = line.strip_prefix(b"sep=").filter(|d| d.len() == 1 && number == 1);
+            if is_remark {
+                remark = &line.trim_ascii_start()[1..];
+            }
+            if let Some([delimiter]) = separator {
+                stated_delimiter = Some(*delimiter);
+            }
+            if number > import.skip_lines as u64 && !line.is_empty() && !is_remark && separator.is_none() {
+                if line.contains(&b'\r') {
+                    return Err(mac_lines());
+                }
+                return Ok(Self { line, start, end, number, stated_delimiter, remark });
+            }
+            (start, number) = (end, number + 1);
+        }
+    }
+
+    /// How the file is written, by this line and the rows below it.
+    fn dialect(&self, import: &Import, below: &[u8]) -> Result<Dialect> {
+        let stated = import.delimiter()?.or(self.stated_delimiter);
+        let delimiter = stated.unwrap_or_else(|| guess_delimiter(self.line, import));
+        let thousands = import.thousands()?;
+        let row = below.split(|b| *b == b'\n').find(|l| !l.trim_ascii().is_empty()).unwrap_or_default();
+        let commas = delimiter != b',' && thousands != Some(b',') && has_decimal_commas(row, delimiter);
+        Ok(Dialect {
+            delimiter,
+            comment: import.comment.and_then(|c| u8::try_from(c).ok()),
+            decimal_comma: import.decimal == Decimal::Comma || commas,
+            thousands,
+            skip_missing: import.missing == Missing::Skip,
+        })
+    }
+
+    fn split(&self, line: &[u8], dialect: Dialect) -> Result<Vec<String>> {
+        Cells::split(line, dialect).map_err(|()| {
+            Error::new(DataCode::RecordingWrongWidth, "a quotation mark is not closed").line(self.number)
+        })
+    }
+
+    /// The names of so many columns that some programs write as a remark above the numbers.
+    fn names_in_remark(&self, columns: usize, dialect: Dialect) -> Result<Vec<String>> {
+        let names = self.split(self.remark.trim_ascii(), dialect)?;
+        if names.len() == columns && names.iter().any(|n| named(n) != Named::Other) {
+            return Ok(names);
+        }
+        Err(Error::new(DataCode::RecordingMissingColumn, "the file has no header line")
+            .line(self.number)
+            .value(String::from_utf8_lossy(&self.line[..self.line.len().min(100)]))
+            .help(
+                "put names with units above the numbers, such as `time_s,pressure_kPa,displacement_mm,force_N`, \
+                 or describe the columns by number in an import description (--import)",
+            ))
     }
 }
 

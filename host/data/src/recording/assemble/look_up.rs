@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use super::super::blocks::Rows;
 use super::super::cells::Want;
-use super::super::column_plan::Role;
+use super::super::column_plan::{LookedUp, Role};
+use super::super::import::Lookup;
 use super::super::words::Words;
 use super::{Job, LookupTable, Table, number, same};
 use crate::date::time_stamp_in;
@@ -19,6 +20,32 @@ pub(super) fn look_up(
     lookup: &LookupTable,
 ) -> Result<()> {
     let Some(described) = &job.import.lookup else { return Ok(()) };
+    let lines = lines_of_rows(job, described, rows, keys, lookup)?;
+    for column in &job.plan.looked_up {
+        let name = &lookup.header[column.index];
+        let cell = |line: &[String]| line.get(column.index).cloned().unwrap_or_default();
+        match &column.role {
+            Role::Quantity(q) | Role::Coded(q, _) => {
+                let value =
+                    |l: &&Vec<String>| value(&cell(l), column).map_err(|e| e.file(&described.file).column(name));
+                table.quantities.insert(*q, lines.iter().map(value).collect::<Result<_>>()?);
+            }
+            Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),
+            Role::Filter(n) => lines.iter().for_each(|l| table.filters[*n].push(&cell(l))),
+            Role::Key(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// For each row the line of the table whose keys are the row's.
+fn lines_of_rows<'a>(
+    job: &Job<'_>,
+    described: &Lookup,
+    rows: &Rows,
+    keys: &HashMap<usize, Words>,
+    lookup: &'a LookupTable,
+) -> Result<Vec<&'a Vec<String>>> {
     let file = job.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut columns = Vec::new();
     for (n, theirs) in described.keys.keys().enumerate() {
@@ -59,41 +86,24 @@ pub(super) fn look_up(
         last = Some((code, line));
         lines.push(line);
     }
-    for column in &job.plan.looked_up {
-        let name = &lookup.header[column.index];
-        let cell = |line: &Vec<String>| line.get(column.index).cloned().unwrap_or_default();
-        let convert = |line: &&Vec<String>| match (column.want, &column.role) {
-            (Want::Number { scale, offset }, _) => {
-                number(&cell(line)).filter(|v| v.is_finite()).map(|v| v * scale + offset).ok_or_else(|| {
-                    Error::new(DataCode::RecordingNotANumber, "not a number in the lookup table")
-                        .file(&described.file)
-                        .column(name)
-                        .value(cell(line))
-                })
-            }
-            (Want::Text, Role::Coded(_, values)) => values.get(cell(line).trim()).copied().ok_or_else(|| {
-                Error::new(DataCode::RecordingNotANumber, "a word without a value")
-                    .file(&described.file)
-                    .value(cell(line))
-            }),
-            (Want::Stamp { scale, offset, order }, _) => {
-                time_stamp_in(&cell(line), order).map(|v| v * scale + offset).ok_or_else(|| {
-                    Error::new(DataCode::RecordingNotANumber, "not a time stamp in the lookup table")
-                        .file(&described.file)
-                        .column(name)
-                        .value(cell(line))
-                })
-            }
-            (Want::Text, _) => Ok(0.0),
-        };
-        match &column.role {
-            Role::Quantity(q) | Role::Coded(q, _) => {
-                table.quantities.insert(*q, lines.iter().map(convert).collect::<Result<_>>()?);
-            }
-            Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),
-            Role::Filter(n) => lines.iter().for_each(|l| table.filters[*n].push(&cell(l))),
-            Role::Key(_) => {}
+    Ok(lines)
+}
+
+/// The number of a cell of the table, in SI.
+fn value(cell: &str, column: &LookedUp) -> Result<f64> {
+    let error = |cause: &str| Error::new(DataCode::RecordingNotANumber, cause.to_owned()).value(cell);
+    match (column.want, &column.role) {
+        (Want::Number { scale, offset }, _) => {
+            let value = number(cell).filter(|v| v.is_finite()).map(|v| v * scale + offset);
+            value.ok_or_else(|| error("not a number in the lookup table"))
         }
+        (Want::Text, Role::Coded(_, values)) => {
+            values.get(cell.trim()).copied().ok_or_else(|| error("a word without a value"))
+        }
+        (Want::Stamp { scale, offset, order }, _) => {
+            let seconds = time_stamp_in(cell, order).map(|v| v * scale + offset);
+            seconds.ok_or_else(|| error("not a time stamp in the lookup table"))
+        }
+        (Want::Text, _) => Ok(0.0),
     }
-    Ok(())
 }

@@ -154,47 +154,18 @@ fn described(
     guess: &mut Guess,
 ) -> Option<GuessedColumn> {
     let column = &sample.columns[n];
-    let (header, what) = (&column.header, quantity.name().replace('_', " "));
+    let header = &column.header;
     let on_column = |text: String| Note::on_column(header, Some(quantity), text);
-    if column.name.is_raw() {
-        let unit = column.name.unit.map_or("", |u| u.text);
-        guess.unknown.push(on_column(format!(
-            "{header} looks like {what} in {unit}: describe it with the scale and the offset of the sensor's calibration"
-        )));
-        return None;
-    }
-    let (mut unit, mut scale, mut offset) = ("", 1.0, 0.0);
-    if let Some(spelled) = column.name.unit {
-        (unit, scale, offset) = (spelled.unit, spelled.scale, spelled.offset);
-    } else if let Some(text) = &column.name.unknown_unit {
-        guess
-            .unknown
-            .push(on_column(format!("{header} looks like {what}, but its unit `{text}` is not known")));
-        return None;
-    } else if quantity == Quantity::Contraction && largest(column, others) > 1.0 {
-        scale = 0.01;
-        let reached = short(largest(column, others));
-        guess.checks.push(on_column(format!("{header} is taken as per cent, since it reaches {reached}")));
-    } else if quantity.units().len() > 1 {
-        let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
-            let (low, high) = column.range();
-            guess.unknown.push(on_column(format!(
-                "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
-                short(low),
-                short(high)
-            )));
+    let (unit, mut scale, mut offset) = match unit_of(column, quantity, others) {
+        Ok((found, check)) => {
+            guess.checks.extend(check.map(&on_column));
+            found
+        }
+        Err(unknown) => {
+            guess.unknown.push(on_column(unknown));
             return None;
-        };
-        (unit, scale) = (suggested.unit, suggested.scale);
-        let others = if suggested.others.is_empty() {
-            String::new()
-        } else {
-            format!(" (or {})", suggested.others.join(", "))
-        };
-        guess
-            .checks
-            .push(on_column(format!("{header} does not say its unit; its values look like {unit}{others}")));
-    }
+        }
+    };
     let (low, high) = column.range();
     if quantity == Quantity::Pressure && column.name.absolute() {
         // Standard atmosphere; the pressure of the day differs by a few per cent of it.
@@ -237,6 +208,51 @@ fn described(
         values: Vec::new(),
         range: Some((low, high)),
     })
+}
+
+/// The unit of a column with its scale and offset, and what should be checked; as an error, why the column has none that is known.
+fn unit_of(
+    column: &SampleColumn,
+    quantity: Quantity,
+    others: &Others<'_>,
+) -> Result<((&'static str, f64, f64), Option<String>), String> {
+    let (header, what) = (&column.header, quantity.name().replace('_', " "));
+    if column.name.is_raw() {
+        let unit = column.name.unit.map_or("", |u| u.text);
+        return Err(format!(
+            "{header} looks like {what} in {unit}: describe it with the scale and the offset of the sensor's calibration"
+        ));
+    }
+    if let Some(spelled) = column.name.unit {
+        return Ok(((spelled.unit, spelled.scale, spelled.offset), None));
+    }
+    if let Some(text) = &column.name.unknown_unit {
+        return Err(format!("{header} looks like {what}, but its unit `{text}` is not known"));
+    }
+    if quantity == Quantity::Contraction && largest(column, others) > 1.0 {
+        let reached = short(largest(column, others));
+        let check = format!("{header} is taken as per cent, since it reaches {reached}");
+        return Ok((("", 0.01, 0.0), Some(check)));
+    }
+    if quantity.units().len() <= 1 {
+        return Ok((("", 1.0, 0.0), None));
+    }
+    let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
+        let (low, high) = column.range();
+        return Err(format!(
+            "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
+            short(low),
+            short(high)
+        ));
+    };
+    let unit = suggested.unit;
+    let others = if suggested.others.is_empty() {
+        String::new()
+    } else {
+        format!(" (or {})", suggested.others.join(", "))
+    };
+    let check = format!("{header} does not say its unit; its values look like {unit}{others}");
+    Ok(((unit, suggested.scale, 0.0), Some(check)))
 }
 
 /// The largest number of a column in all files, of either sign.
