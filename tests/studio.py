@@ -162,7 +162,7 @@ HISTORY = """
     found.exact = seenAsCsv().trim().split("\\n").length - 1;
     const panel = addPanel("F", "spectrum"), speed = addPanel("v", "time"), against = addPanel("F", "x");
     draw();
-    found.peak = [panel.scope.peak.frequency, panel.scope.peak.amplitude, panel.told.textContent];
+    found.peak = [panel.scope.peak.frequency, panel.scope.peak.amplitude, panel.note.textContent];
     found.speed = ring.last("v"); found.error = ring.last("e"); found.gap = ring.last("r");
     found.kept = localStorage.getItem("studio-pictures");
     const picture = seenAsPicture(); found.picture = [picture.width, picture.height];

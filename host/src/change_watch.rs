@@ -194,13 +194,13 @@ struct Comparison {
     rows: VecDeque<Row>,
     fresh: usize,
     before_last: Option<Vec<String>>,
-    told: bool,
+    reported: bool,
 }
 
 impl Comparison {
     fn new(reference: Arc<Reference>, mounted: Mounted) -> Self {
         let options = Options { mounted, ..Options::default() };
-        Self { reference, options, rows: VecDeque::new(), fresh: 0, before_last: None, told: false }
+        Self { reference, options, rows: VecDeque::new(), fresh: 0, before_last: None, reported: false }
     }
 
     fn serve(mut self, batches: &Receiver<Vec<Row>>, mut say: impl FnMut(Update) -> bool) -> Option<Update> {
@@ -259,7 +259,7 @@ impl Comparison {
         self.before_last = names;
         if self.before_last.is_none() {
             // Said once: why does not change from one comparison to the next.
-            return (!std::mem::replace(&mut self.told, true)).then_some(update);
+            return (!std::mem::replace(&mut self.reported, true)).then_some(update);
         }
         same.then_some(update)
     }

@@ -54,18 +54,18 @@ fn fleet(folder: &Path, count: u64) {
 
 /// Every file below a folder with its bytes.
 fn tree(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    fn look(root: &Path, folder: &Path, found: &mut BTreeMap<PathBuf, Vec<u8>>) {
+    fn visit(root: &Path, folder: &Path, found: &mut BTreeMap<PathBuf, Vec<u8>>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
-                look(root, &path, found);
+                visit(root, &path, found);
             } else {
                 found.insert(path.strip_prefix(root).unwrap().to_path_buf(), fs::read(&path).unwrap());
             }
         }
     }
     let mut found = BTreeMap::new();
-    look(root, root, &mut found);
+    visit(root, root, &mut found);
     found
 }
 
@@ -344,19 +344,19 @@ fn a_spoiled_muscle_is_a_failure_and_the_others_are_untouched() {
     let spoiled = folder.join("spoiled");
     for ((what, code, _), name) in WAYS.iter().zip(&names) {
         let failures = table(&spoiled, name, "failures");
-        let told = |column: &str| failures.text(column, 0).unwrap_or_default().to_owned();
+        let cell = |column: &str| failures.text(column, 0).unwrap_or_default().to_owned();
         assert_eq!(
-            (failures.rows(), told("code").as_str()),
+            (failures.rows(), cell("code").as_str()),
             (1, *code),
             "{what} ({name}): {}",
-            told("cause")
+            cell("cause")
         );
-        assert!(!told("cause").is_empty() && told("remedy").len() > 10, "{what}: {failures:?}");
+        assert!(!cell("cause").is_empty() && cell("remedy").len() > 10, "{what}: {failures:?}");
         if *code != "fit::underdetermined" {
             assert!(
-                !told("place").is_empty() && !told("place").contains(&folder.display().to_string()),
+                !cell("place").is_empty() && !cell("place").contains(&folder.display().to_string()),
                 "{what}: {}",
-                told("place")
+                cell("place")
             );
         }
         assert_eq!(table(&spoiled, name, "fits").rows(), 0, "{what}");

@@ -217,8 +217,8 @@ fn generated(name: &str) -> Option<String> {
         "endpoints" => {
             let of = |name: &str| if name == "()" { "–".to_owned() } else { format!("`{name}`") };
             let rows = endpoints::TABLE.iter().map(|r| {
-                let (asked, answered) = (of(r.request), of(r.response));
-                format!("| {} | `{}` | {asked} | {answered} | {} |\n", r.id, r.name, r.what.trim())
+                let (request, answered) = (of(r.request), of(r.response));
+                format!("| {} | `{}` | {request} | {answered} | {} |\n", r.id, r.name, r.what.trim())
             });
             Some(format!(
                 "| number | endpoint | request | response | what it does |\n| ---: | --- | --- | --- | --- |\n{}",

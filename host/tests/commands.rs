@@ -24,7 +24,7 @@ fn host(folder: &Path, arguments: &[&str], port: Option<&str>) -> (i32, String) 
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    fn look(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
+    fn visit(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
         let subs: Vec<_> = command.get_subcommands().collect();
         if subs.is_empty() {
             let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
@@ -33,17 +33,17 @@ fn every_command_has_help_with_an_example() {
             }
         }
         for sub in subs {
-            look(sub, &format!("{path} {}", sub.get_name()), poor);
+            visit(sub, &format!("{path} {}", sub.get_name()), poor);
         }
     }
     let mut poor = Vec::new();
-    look(&host::cli::Cli::command(), "host", &mut poor);
+    visit(&host::cli::Cli::command(), "host", &mut poor);
     assert!(poor.is_empty(), "without an example of their own: {poor:?}");
 }
 
 #[test]
 fn help_fits_the_terminal_and_its_examples_can_be_copied() {
-    fn look(command: &clap::Command, path: &[&str], wrong: &mut Vec<String>) {
+    fn visit(command: &clap::Command, path: &[&str], wrong: &mut Vec<String>) {
         // A wrapped example is two commands; a long one is continued on purpose.
         let below = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         wrong.extend(
@@ -67,27 +67,27 @@ fn help_fits_the_terminal_and_its_examples_can_be_copied() {
             );
         }
         for sub in command.get_subcommands() {
-            look(sub, &[path, &[sub.get_name()]].concat(), wrong);
+            visit(sub, &[path, &[sub.get_name()]].concat(), wrong);
         }
     }
     let mut wrong = Vec::new();
-    look(&host::cli::Cli::command(), &[], &mut wrong);
+    visit(&host::cli::Cli::command(), &[], &mut wrong);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
 fn every_command_with_a_result_gives_it_as_json_too() {
-    fn look(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
+    fn visit(command: &clap::Command, path: &str, poor: &mut Vec<String>) {
         let subs: Vec<_> = command.get_subcommands().collect();
         if subs.is_empty() && command.get_arguments().all(|a| a.get_id() != "json") {
             poor.push(path.to_owned());
         }
         for sub in subs {
-            look(sub, &format!("{path} {}", sub.get_name()), poor);
+            visit(sub, &format!("{path} {}", sub.get_name()), poor);
         }
     }
     let mut poor = Vec::new();
-    look(&host::cli::Cli::command(), "host", &mut poor);
+    visit(&host::cli::Cli::command(), "host", &mut poor);
     // A conversation, a shell's script and pages for `man` are none.
     assert_eq!(poor, ["host new", "host completions", "host man"]);
 }

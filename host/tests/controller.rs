@@ -200,8 +200,8 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
     bench.done(&["flash", "narrow.pam"]);
     let said = bench.done(&["run", "--force", "50", "--seconds", "0.5", "--json"]);
     assert!(said.contains("outside the tested range of its table (up to 220 kPa"), "{said}");
-    let told = serde_json::Deserializer::from_str(&said).into_iter::<serde_json::Value>().next();
-    let reach = told.unwrap().unwrap()["reach"].clone();
+    let answer = serde_json::Deserializer::from_str(&said).into_iter::<serde_json::Value>().next();
+    let reach = answer.unwrap().unwrap()["reach"].clone();
     let seconds = |name: &str| reach[name].as_f64().unwrap();
     assert!(seconds("outside_tested_s") > 0.3 && seconds("beyond_blocked_force_s") == 0.0, "{said}");
 }
@@ -384,10 +384,10 @@ fn the_demo_tells_the_whole_story() {
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let share = |law: usize| told["tracking"][law]["sine_rms_pct"].as_f64().unwrap();
-    assert_eq!(told["tracking"][0]["feed_forward"], "table");
-    assert!(share(0) < 2.0 && share(1) > 10.0, "{told}");
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let share = |law: usize| answer["tracking"][law]["sine_rms_pct"].as_f64().unwrap();
+    assert_eq!(answer["tracking"][0]["feed_forward"], "table");
+    assert!(share(0) < 2.0 && share(1) > 10.0, "{answer}");
     for (name, seconds) in [("sine", 5), ("steps", 4)] {
         let text = std::fs::read_to_string(folder.path().join(format!("run-table-{name}.csv"))).unwrap();
         let rows = text.lines().count() - 1;

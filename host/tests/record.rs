@@ -184,9 +184,9 @@ fn a_cable_that_is_pulled_ends_the_recording_at_a_whole_row() {
     grown(&folder.path().join("run.csv.part"), 40_000);
     line.shutdown(Shutdown::Both).unwrap();
     let output = child.wait_with_output().unwrap();
-    let told = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("error[device::") && told.contains(" until then in run.csv"), "{told}");
+    let message = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("error[device::") && message.contains(" until then in run.csv"), "{message}");
     let (a, b) = (read(&folder.path().join("run.csv")), read(&folder.path().join("run.mcap")));
     assert!(a.len() > 100 && a.len() == b.len(), "{} and {}", a.len(), b.len());
     let text = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
@@ -244,8 +244,8 @@ fn every_tick_that_the_rows_miss_is_reported() {
     let side = json(&std::fs::read(side_file(&folder.path().join("run.csv"))).unwrap());
     assert_eq!(side["losses"]["samples"], missing, "{}", side["losses"]);
     assert_eq!(json(&output.stdout)["losses"], side["losses"]);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains(&format!("{missing} samples missing in ")), "{told}");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains(&format!("{missing} samples missing in ")), "{message}");
     let mcap = String::from_utf8_lossy(&std::fs::read(folder.path().join("run.mcap")).unwrap()).into_owned();
     assert!(
         mcap.contains(&format!("\"samples\": {missing}")) || mcap.contains(&format!("\"samples\":{missing}"))
@@ -271,13 +271,13 @@ fn a_disk_without_room_keeps_every_row_that_fitted() {
         .env("PAM_SETTINGS", "")
         .output()
         .unwrap();
-    let told = said(&output);
-    if output.status.code() == Some(77) || told.starts_with("unshare:") {
-        eprintln!("skipped: no file system can be mounted here: {told}");
+    let message = said(&output);
+    if output.status.code() == Some(77) || message.starts_with("unshare:") {
+        eprintln!("skipped: no file system can be mounted here: {message}");
         return;
     }
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("error[file::unwritable]") && told.contains("No space left"), "{told}");
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("error[file::unwritable]") && message.contains("No space left"), "{message}");
     let kept = folder.path().join("kept");
     let (a, b) = (read(&kept.join("run.csv")), read(&kept.join("run.mcap")));
     // One megabyte holds some thousand samples in both forms; both end within a few pieces of one another.

@@ -306,12 +306,12 @@ impl<T: Scalar> Muscle<T> {
     pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
         moment.at_stroke = self.at_stroke(Length::from_metres(motion.stroke));
         moment.slopes = self.slopes(&moment.at_stroke);
-        self.look(moment, motion, pressure);
+        self.fill_context(moment, motion, pressure);
     }
 
     /// The rest of [`Muscle::update`]: what effects look at, in a moment that has its shape and slopes already.
     #[inline]
-    pub(crate) fn look(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
+    pub(crate) fn fill_context(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
         let Moment { at_stroke, slopes, context } = moment;
         let posture = &at_stroke.posture;
         context.dt = motion.dt;

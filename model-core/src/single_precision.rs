@@ -117,7 +117,7 @@ pub fn pressure_with(
 pub fn update(muscle: &Muscle<f32>, moment: &mut Moment<f32>, motion: &Motion<f32>, pressure: Pressure<f32>) {
     hold(muscle, &mut moment.at_stroke, Length::from_metres(motion.stroke));
     refresh_slopes(muscle, &moment.at_stroke, &mut moment.slopes);
-    muscle.look(moment, motion, pressure);
+    muscle.fill_context(moment, motion, pressure);
 }
 
 /// [`Chain::step`].

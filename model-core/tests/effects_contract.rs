@@ -143,7 +143,7 @@ fn the_order_on_the_wire_stays() {
 }
 
 #[test]
-fn whether_the_force_depends_on_the_pressure_of_the_moment_is_told() {
+fn whether_the_force_depends_on_the_pressure_of_the_moment_is_reported() {
     let contexts = motion(&[
         Leg { stroke: 2e-3, pressure: 400e3, dt: 1e-2, readings: 200 },
         Leg { stroke: 0.5e-3, pressure: 450e3, dt: 1e-2, readings: 100 },

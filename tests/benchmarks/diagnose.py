@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the time of a diagnosis with all candidates, and writes diagnose.md.
 
-    python3 tests/benchmarks/diagnose.py [ROWS]       a million unless told otherwise
+    python3 tests/benchmarks/diagnose.py [ROWS]       a million by default
 
 Builds what it needs. The campaign is that of the enriched protocol (loops at several speeds, dwells, nested loops, tares) on a muscle
 whose load cell reads three per cent too much, sampled so often that it has so many rows; the bench is `virtual-bench`.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times `host fit` on ten differently made files beside polars reading them, and writes files.md.
 
-    python3 tests/benchmarks/files.py [ROWS]      10 million unless told otherwise
+    python3 tests/benchmarks/files.py [ROWS]      10 million by default
 
 Two of the files are real recordings, repeated to the end, if ../shared/data is next to the project. The bounds hold for each file: 2.5
 times the processor time of polars's reading, and 1 GB of memory. Builds what it needs. Programs run in turn, several times; the least counts.

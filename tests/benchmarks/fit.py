@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares the speed of the fit with programs that do parts of it, and writes fit.md.
 
-    python3 tests/benchmarks/fit.py [ROWS]        10 million unless told otherwise
+    python3 tests/benchmarks/fit.py [ROWS]        10 million by default
 
 1. The thesis's objective (eq. 23) on six pressures x 100 points, M = 4, P0 given: SciPy's SLSQP and trust-constr, numpy's lstsq, and
    this project on the same points; the minimisers as they come, and to within a hundredth of the least objective. Then this

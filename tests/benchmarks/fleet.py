@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures `host batch` and writes fleet.md.
 
-    python3 tests/benchmarks/fleet.py [--whole] [MUSCLES] [ROWS] [PROGRAMS]        400 muscles of 20,000 rows unless told otherwise
+    python3 tests/benchmarks/fleet.py [--whole] [MUSCLES] [ROWS] [PROGRAMS]        400 muscles of 20,000 rows by default
 
 The page names the number of muscles that were run. With --whole, a fleet of 10,000 is fitted too; without it, its time is extrapolated. A Dask job that calls SciPy (fleet_dask.py) fits some of
 the muscles for comparison.

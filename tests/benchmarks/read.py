@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares the speed of reading a recording with polars and pandas on the same file, and writes read.md.
 
-    python3 tests/benchmarks/read.py [ROWS]       10 million unless told otherwise
+    python3 tests/benchmarks/read.py [ROWS]       10 million by default
 
 Builds what it needs. Every reader runs in a process of its own, in turn, several times; the least counts. Of the peers only the
 reading itself is timed, of `host` the whole process.

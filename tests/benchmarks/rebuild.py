@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures what a build costs after one line was changed, now and at an earlier commit, and writes rebuild.md.
 
-    python3 tests/benchmarks/rebuild.py [COMMIT]       the commit before the host became several crates unless told otherwise
+    python3 tests/benchmarks/rebuild.py [COMMIT]       the commit before the host became several crates by default
 
 Each tree is a worktree in a temporary folder with a build folder of its own; PAM_BUILDS names a folder that keeps them for the next run.
 The program `host` is built with debug profile; then a function is added to one file, and the program is built again. Processor time is

@@ -114,7 +114,7 @@ class Can(Registers):
         self.words.update({0x00: 0x00010002, 0x1C: 0x01230000, 0x200: 0x2A1C0E01})
         self.initialised, self.asleep, self.joins = False, True, 0
         self.errors, self.bus_off, self.code = 0, False, 0
-        self.told_error = False
+        self.error_reported = False
         self.fifos, self.overrun = ([], []), [False, False]
         # Mailboxes with a request, in its order; those that are done; that which is on the bus; those to be given up.
         self.order, self.done, self.sending, self.unwanted = [], {}, None, set()
@@ -181,7 +181,7 @@ class Can(Registers):
 
     def tell(self, enable):
         if self.get(0x14) & enable:
-            self.told_error = True
+            self.error_reported = True
 
     def finish(self, number, ok):
         self.order.remove(number)
@@ -213,7 +213,7 @@ class Can(Registers):
 
     def read(self, offset):
         if offset == 0x04:
-            return int(self.initialised) | int(self.asleep) << 1 | int(self.told_error) << 2 | 0xC00
+            return int(self.initialised) | int(self.asleep) << 1 | int(self.error_reported) << 2 | 0xC00
         if offset == 0x08:
             free = [number for number in range(3) if number not in self.order]
             value = sum((1 | int(ok) << 1) << 8 * number for number, ok in self.done.items())
@@ -238,7 +238,7 @@ class Can(Registers):
         if offset == 0x00:
             self.control(value)
         elif offset == 0x04:
-            self.told_error &= not value >> 2 & 1
+            self.error_reported &= not value >> 2 & 1
         elif offset == 0x08:
             for number in range(3):
                 if value >> 8 * number & 1:
@@ -308,7 +308,7 @@ class Can(Registers):
         for fifo, line in ((0, self.RX0), (1, self.RX1)):
             if enabled >> 1 + 3 * fifo & 1 and self.fifos[fifo]:
                 yield line
-        if enabled >> 15 & 1 and self.told_error:
+        if enabled >> 15 & 1 and self.error_reported:
             yield self.SCE
 
 

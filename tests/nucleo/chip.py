@@ -103,7 +103,7 @@ class Chip:
         self.uc.reg_write(UC_ARM_REG_SP, stack)
         self.uc.reg_write(UC_ARM_REG_LR, 0xFFFFFFFF)
         self.uc.reg_write(UC_ARM_REG_PC, reset | 1)
-        self.told()
+        self.note_outputs()
 
     # Time.
 
@@ -131,7 +131,7 @@ class Chip:
 
     # Outputs.
 
-    def told(self):
+    def note_outputs(self):
         """Notes what acts on the muscle: the dump valve and the regulator's command."""
         if not hasattr(self, "dac") or not hasattr(self, "portb"):
             return

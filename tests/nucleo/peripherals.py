@@ -400,7 +400,7 @@ class Dac(Registers):
 
     def write(self, offset, value):
         self.words[offset] = value
-        self.chip.told()
+        self.chip.note_outputs()
 
 
 class Gpio(Registers):
@@ -418,7 +418,7 @@ class Gpio(Registers):
             self.words[0x14] = self.get(0x14) & ~(value >> 16) | value & 0xFFFF
         else:
             self.words[offset] = value
-        self.chip.told()
+        self.chip.note_outputs()
 
     def drives_high(self, pin):
         """Whether a pin is an output that is high; else its resistor to ground decides."""

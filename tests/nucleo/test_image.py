@@ -342,7 +342,7 @@ class Failures(unittest.TestCase):
         self.assertEqual(board.restarted(within=0.060)[0], "watchdog")
         self.assertTrue(board.chip.valve_open)
 
-    def test_a_crystal_that_stops_vents_at_once_and_is_told_after_the_restart(self):
+    def test_a_crystal_that_stops_vents_at_once_and_is_reported_after_the_restart(self):
         board = self.running()
         board.chip.rcc.lose_crystal()
         self.assert_vented_within(board, 50e-6)

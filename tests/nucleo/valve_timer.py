@@ -43,7 +43,7 @@ class ValveTimer(Registers):
                 assert value & self.ONE_PULSE, "it stops at the end of a period"
                 self.since = self.chip.now
         self.plan()
-        self.chip.told()
+        self.chip.note_outputs()
 
     def plan(self):
         """Notes the outputs at each compare, and stops at the end of the period."""
@@ -60,7 +60,7 @@ class ValveTimer(Registers):
         if turn == self.turn:
             if is_end:
                 self.words[self.CONTROL] = self.get(self.CONTROL) & ~1
-            self.chip.told()
+            self.chip.note_outputs()
 
     def is_high(self, channel):
         """Level of an output; one that is off leaves the pin to its resistor."""

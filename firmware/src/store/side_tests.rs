@@ -71,7 +71,7 @@ fn no_more_memories_are_read_than_were_kept_or_can_be() {
 }
 
 #[test]
-fn a_full_flash_and_one_that_fails_are_told_apart() {
+fn a_full_flash_and_one_that_fails_are_distinguished() {
     let mut store = open(MockFlash::erased());
     assert_eq!(store.put_bytes(0x20, &[7; 3_000]), Err(StoreFault::Full), "longer than a page");
     let most = [7; 700];

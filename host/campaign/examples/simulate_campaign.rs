@@ -34,7 +34,7 @@ fn main() -> Result<()> {
             c.choosing_s,
             done.spoiled,
             c.why,
-            done.told,
+            done.finding,
         );
     }
     Ok(())

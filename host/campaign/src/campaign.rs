@@ -33,8 +33,8 @@ pub struct Done {
     pub clock_s: (f64, f64),
     /// Attempts that were spoiled, and why.
     pub spoiled: Vec<Spoiled>,
-    /// What it told.
-    pub told: String,
+    /// What it showed, as text.
+    pub finding: String,
 }
 
 /// Who watches a campaign.
@@ -182,10 +182,10 @@ fn go(
         spent += actuation.clock() - begin;
         let mut done = Done { clock_s: (begin, actuation.clock()), ..done };
         actuation.compute(true);
-        let told = engine.learn(spent);
+        let finding = engine.learn(spent);
         actuation.compute(false);
-        done.told = told?;
-        sink.event(Event::Told { number: done.chosen.number, words: done.told.clone() })?;
+        done.finding = finding?;
+        sink.event(Event::Finding { number: done.chosen.number, words: done.finding.clone() })?;
         observer.done(&done);
         course.push(done);
     }
@@ -217,7 +217,7 @@ fn one_check(
         rows: 0,
         clock_s,
         spoiled: Vec::new(),
-        told: String::new(),
+        finding: String::new(),
     })
 }
 
@@ -270,8 +270,8 @@ fn one_step(
                 let recorded = sink.recording(&file, watch.rows())?;
                 engine.add(chosen.step, Some(Recording { name: chosen.step.name(), ..recorded }));
                 let clock_s = (begin_s, end_s);
-                let told = String::new();
-                return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, told }));
+                let finding = String::new();
+                return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, finding }));
             }
             Some(reason) => {
                 let (file, rows) = sink.finish(Completion::Spoiled, watch.rows())?;
@@ -289,8 +289,8 @@ fn one_step(
                 if spoiled.len() as u32 > REPEATS {
                     engine.leave_out(chosen.step);
                     let clock_s = (begin_s, end_s);
-                    let told = format!("Left out: {reason}.");
-                    return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, told }));
+                    let finding = format!("Left out: {reason}.");
+                    return Ok(Some(Done { chosen: chosen.clone(), file, rows, clock_s, spoiled, finding }));
                 }
             }
         }

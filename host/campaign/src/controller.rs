@@ -31,7 +31,7 @@ pub struct Controller {
     client: Client,
     axis: Box<dyn StrokeAxis>,
     checks: MakeCheck,
-    /// Clock of the campaign less the time of the device; unknown until the device has told its time.
+    /// Clock of the campaign less the time of the device; unknown until the device has sent its time.
     ahead: Option<f64>,
     /// Clock of the last reading.
     clock: f64,

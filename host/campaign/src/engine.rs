@@ -254,16 +254,16 @@ impl Engine {
     pub fn learn(&mut self, spent_s: f64) -> Result<String> {
         let before = self.findings.as_ref().map(|f| f.fit.summary.deadband_kPa);
         self.fit();
-        let mut told = words::table(before, self.findings.as_ref());
+        let mut finding = words::table(before, self.findings.as_ref());
         let due = self.since_diagnosis >= DIAGNOSE_EVERY && spent_s >= DIAGNOSE_FROM;
         if due && self.purpose != Purpose::Fit && self.findings.is_some() {
             let earlier = self.diagnosis.as_ref().map(names);
             self.diagnose()?;
             if let Some(d) = &self.diagnosis {
-                told += &words::diagnosis(earlier.as_deref(), d);
+                finding += &words::diagnosis(earlier.as_deref(), d);
             }
         }
-        Ok(told)
+        Ok(finding)
     }
 
     /// Fits the table to everything recorded.

@@ -126,8 +126,9 @@ pub enum Event {
         /// Clock at its end, s.
         end_s: f64,
     },
-    /// What a step told.
-    Told {
+    /// What a step showed.
+    #[serde(rename = "told")]
+    Finding {
         /// Its number.
         number: u32,
         /// As text.
@@ -278,19 +279,19 @@ impl Journal {
     /// Clock at which the campaign stood when the last row was written, s, and when that was, in seconds since 1970.
     #[must_use]
     pub fn clock(&self) -> Option<f64> {
-        let told = self.events.iter().rev().find_map(|e| match e {
+        let recorded = self.events.iter().rev().find_map(|e| match e {
             Event::Recorded { end_s, .. } | Event::Spoiled { end_s, .. } | Event::Checked { end_s, .. } => {
                 Some(*end_s)
             }
             Event::Ended { clock_s, .. } | Event::Begin { clock_s, .. } => Some(*clock_s),
             _ => None,
         });
-        // The rows of an interrupted step, however few, are later than all that the log tells a time of.
+        // The rows of an interrupted step, however few, are later than every time in the log.
         let cut = self.events.iter().rev().find_map(|e| match e {
             Event::Cut { file, .. } if !file.is_empty() => last_time(&self.folder.join(file)),
             _ => None,
         });
-        told.into_iter().chain(cut).reduce(f64::max)
+        recorded.into_iter().chain(cut).reduce(f64::max)
     }
 
     /// Recordings that the fit reads, in order.

@@ -184,18 +184,18 @@ mod tests {
         let machine = std::thread::spawn(move || {
             let (stream, _) = listener.accept().unwrap();
             let mut lines = BufReader::new(stream);
-            let mut heard = Vec::new();
+            let mut lines_received = Vec::new();
             // The last answer comes in two pieces.
             for answer in [vec!["ok\n"], vec!["limit\n"], vec!["o", "k\r\n"]] {
                 let mut line = String::new();
                 lines.read_line(&mut line).unwrap();
-                heard.push(line);
+                lines_received.push(line);
                 for piece in answer {
                     lines.get_mut().write_all(piece.as_bytes()).unwrap();
                     std::thread::sleep(Duration::from_millis(20));
                 }
             }
-            heard
+            lines_received
         });
         let mut axis = Line::open(&address, BAUD).unwrap();
         axis.go(1.5e-3, 2e-3).unwrap();

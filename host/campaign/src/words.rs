@@ -1,4 +1,4 @@
-//! The sentences of a campaign: why a step was chosen, what it told, why it ended.
+//! The sentences of a campaign: why a step was chosen, what it showed, why it ended.
 
 use pam_diagnose::Diagnosis;
 
@@ -63,7 +63,7 @@ pub fn why(gain: &Gain, diagnosis: Option<&Diagnosis>, step: &Step) -> String {
     "It would show effects that nothing recorded so far could have shown.".into()
 }
 
-/// What a step told about the table.
+/// What a step showed about the table.
 #[must_use]
 pub fn table(before: Option<f64>, findings: Option<&Findings>) -> String {
     let Some(findings) = findings else { return "The recordings do not determine a table yet.".into() };

@@ -217,7 +217,7 @@ mod tests {
             ("name = \"mini-1\"", "name = \"\""),
             ("3.0", "\"3.0\""),
         ];
-        let told: Vec<_> = cases.iter().map(|(a, b)| refused(a, b)).collect();
-        insta::assert_snapshot!(told.join("\n"));
+        let messages: Vec<_> = cases.iter().map(|(a, b)| refused(a, b)).collect();
+        insta::assert_snapshot!(messages.join("\n"));
     }
 }

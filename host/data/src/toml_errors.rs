@@ -68,7 +68,7 @@ mod tests {
         count: Option<u32>,
     }
 
-    fn told(text: &str) -> String {
+    fn message(text: &str) -> String {
         let error = toml::from_str::<Example>(text).unwrap_err();
         let error = toml_error(DataCode::MuscleInvalid, text, &error);
         let advice = if error.advised() { error.advice().unwrap_or_default() } else { "" };
@@ -93,7 +93,7 @@ mod tests {
             ),
         ];
         for (text, words) in cases {
-            assert_eq!(told(text), words);
+            assert_eq!(message(text), words);
         }
     }
 }

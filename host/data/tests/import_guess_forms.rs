@@ -105,7 +105,7 @@ fn a_line_above_the_table_is_taken_only_for_the_muscles_own_pressure() {
 }
 
 #[test]
-fn cells_that_are_no_numbers_are_told_and_nothing_replaces_their_column() {
+fn cells_that_are_no_numbers_are_reported_and_nothing_replaces_their_column() {
     let rows = stroke(|[t, p, x, f]| format!("{t:.2}\t\"{p:.0},000\"\t{x:.3}\t{f:.3}"));
     let (guess, recordings) =
         read(&[("a_200kPa.txt", format!("t (s)\tp (Pa)\tx (mm)\tF (N)\n{rows}").into())]);
@@ -193,7 +193,7 @@ fn lengths_that_are_held_with_the_noise_of_a_sensor_count_from_the_rest_length()
 }
 
 #[test]
-fn channels_are_told_apart_by_what_they_record() {
+fn channels_are_distinguished_by_what_they_record() {
     // A second load cell that is not connected, a strain of the machine, channels that are numbered.
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},{x:.3},0,{f:.3}"));
     let (guess, recordings) =
@@ -233,18 +233,18 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
 }
 
 #[test]
-fn what_a_file_lacks_is_told_with_the_right_remedy() {
-    let told = |text: String| read(&[("a_300kPa.csv", text.into())]).0.all_unknown();
+fn what_a_file_lacks_is_reported_with_the_right_remedy() {
+    let unknown = |text: String| read(&[("a_300kPa.csv", text.into())]).0.all_unknown();
     let head = "time_s,pressure_kPa,displacement_mm,force_N\n";
     // Two sensors in rows of their own: leaving out incomplete rows leaves none.
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},,\n{:.2},,{x:.3},{f:.3}", t + 0.02));
-    assert!(told(format!("{head}{rows}")).contains("no row has a number in every column"));
+    assert!(unknown(format!("{head}{rows}")).contains("no row has a number in every column"));
     let rows = stroke(|[t, p, x, f]| format!("{:.0},{p},{x:.3},{f:.3}", t.floor()));
-    assert!(told(format!("{head}{rows}")).contains("coarser than the rows"));
+    assert!(unknown(format!("{head}{rows}")).contains("coarser than the rows"));
     let rows = stroke(|[t, p, x, f]| {
         format!("{},{p},{x:.3},{f:.3}", (4_294_000_000 + (t * 1e6) as u64) % (1 << 32))
     });
-    let wraps = told(format!("micros,pressure_kPa,displacement_mm,force_N\n{rows}"));
+    let wraps = unknown(format!("micros,pressure_kPa,displacement_mm,force_N\n{rows}"));
     assert!(wraps.contains("a counter of 32 bits began again behind row 20"), "{wraps}");
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},{x:.3},{f:.3},{:.2},{p},{x:.3},{f:.3}", t + 0.3));
     let two = format!("Time_1,Press_1,Ext_1,Load_1,Time_2,Press_2,Ext_2,Load_2\n{rows}");
@@ -281,7 +281,7 @@ fn units_that_no_name_says_are_those_that_suit_all_files() {
 }
 
 #[test]
-fn files_with_another_order_of_columns_are_told_where_columns_are_counted() {
+fn files_with_another_order_of_columns_are_reported_where_columns_are_counted() {
     let machine = |names: &str, row: fn([f64; 4]) -> String| format!("{names}\n{}", stroke(row)).into_bytes();
     let first = machine("Time\tPressure\tStroke\tForce\ns\tkPa\tmm\tN", |[t, p, x, f]| {
         format!("{t:.2}\t{p}\t{x:.3}\t{f:.3}")
@@ -289,10 +289,10 @@ fn files_with_another_order_of_columns_are_told_where_columns_are_counted() {
     let other = machine("Time\tForce\tStroke\tPressure\ns\tN\tmm\tkPa", |[t, p, x, f]| {
         format!("{t:.2}\t{f:.3}\t{x:.3}\t{p}")
     });
-    let told =
+    let remarks =
         |second: &Vec<u8>| read(&[("a.txt", first.clone()), ("b.txt", second.clone())]).0.all_unknown();
-    assert!(told(&other).contains("b.txt have other names or another order"), "{}", told(&other));
-    assert_eq!(told(&first), "");
+    assert!(remarks(&other).contains("b.txt have other names or another order"), "{}", remarks(&other));
+    assert_eq!(remarks(&first), "");
 }
 
 #[test]

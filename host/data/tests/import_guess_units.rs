@@ -42,11 +42,11 @@ fn read_back(text: &str) -> Guess {
     let (guessed, r) = by_guess(text);
     let force = r.require_force().unwrap_or_else(|e| panic!("{}\n{e}", guessed.description));
     for (i, [t, p, x, f]) in readings().into_iter().enumerate() {
-        let told = format!("row {i}\n{}", guessed.description);
-        assert!((r.time[i] - r.time[0] - t).abs() < 1e-6, "{} s, {told}", r.time[i] - r.time[0]);
-        assert!((r.pressure[i] - 1e3 * p).abs() < 1.0, "{} Pa, {told}", r.pressure[i]);
-        assert!((r.stroke[i] - 1e-3 * x).abs() < 1e-6, "{} m, {told}", r.stroke[i]);
-        assert!((force[i] - f).abs() < 1e-3, "{} N, {told}", force[i]);
+        let context = format!("row {i}\n{}", guessed.description);
+        assert!((r.time[i] - r.time[0] - t).abs() < 1e-6, "{} s, {context}", r.time[i] - r.time[0]);
+        assert!((r.pressure[i] - 1e3 * p).abs() < 1.0, "{} Pa, {context}", r.pressure[i]);
+        assert!((r.stroke[i] - 1e-3 * x).abs() < 1e-6, "{} m, {context}", r.stroke[i]);
+        assert!((force[i] - f).abs() < 1e-3, "{} N, {context}", force[i]);
     }
     guessed
 }
@@ -79,12 +79,12 @@ fn a_unit_that_counts_from_vacuum_loses_one_atmosphere() {
     ];
     for text in files {
         let guessed = read_back(&text);
-        let told = guessed
+        let notes = guessed
             .checks
             .iter()
             .filter(|c| c.text().contains("one standard atmosphere is subtracted"))
             .count();
-        assert_eq!(told, 1, "{}", guessed.description);
+        assert_eq!(notes, 1, "{}", guessed.description);
     }
 }
 
@@ -223,7 +223,7 @@ fn spreadsheets_with_decimal_commas_are_read_with_their_time_stamps_and_two_rows
 }
 
 #[test]
-fn a_stamp_that_is_ambiguous_or_damaged_is_told() {
+fn a_stamp_that_is_ambiguous_or_damaged_is_reported() {
     let header = "Timestamp,pressure_kPa,stroke_mm,force_N";
     let american = file(header, |[t, p, x, f]| format!("11/05/2026 1:30:{t:05.2} PM,{p},{x},{f}"));
     let folder = tempfile::tempdir().unwrap();

@@ -34,7 +34,7 @@ fn line_12(line: &'static str) -> Vec<u8> {
 }
 
 #[test]
-fn every_bad_input_is_told_with_place_and_remedy() {
+fn every_bad_input_is_reported_with_place_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let with_header =
         |header: &str| [header.as_bytes(), b"\n", &table(20, |_| None)[HEADER.len()..]].concat();
@@ -104,24 +104,24 @@ fn every_bad_input_is_told_with_place_and_remedy() {
         ("cut.gz", gzip[..gzip.len() / 2].to_vec()),
         ("damaged.zst", [&[0x28, 0xb5, 0x2f, 0xfd][..], &[0xff; 40]].concat()),
     ];
-    let mut told = String::new();
+    let mut messages = String::new();
     for (name, bytes) in cases {
         let error = read(folder.path(), name, &bytes, None).expect_err(name);
         let text = error.to_string().replace(&format!("{}/", folder.path().display()), "");
-        writeln!(told, "{name}: [{}] {text}\n    {}", error.code().name(), error.advice().unwrap_or("-"))
+        writeln!(messages, "{name}: [{}] {text}\n    {}", error.code().name(), error.advice().unwrap_or("-"))
             .unwrap();
     }
     let absent = Reader::new().file(&folder.path().join("absent.csv")).unwrap_err();
     let is_folder = Reader::new().file(folder.path()).unwrap_err();
     for error in [absent, is_folder] {
         let text = error.to_string().replace(&folder.path().display().to_string(), "FOLDER");
-        writeln!(told, "[{}] {text}", error.code().name()).unwrap();
+        writeln!(messages, "[{}] {text}", error.code().name()).unwrap();
     }
-    insta::assert_snapshot!(told);
+    insta::assert_snapshot!(messages);
 }
 
 #[test]
-fn every_bad_import_description_is_told() {
+fn every_bad_import_description_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         ("skip_lines = -1", ""),
@@ -145,15 +145,20 @@ fn every_bad_import_description_is_told() {
         ("[lookup]\nfile = \"absent.csv\"\nmatch = { file = \"{file}\" }", ""),
         ("decimal = \"comma\"\ndelimiter = \"comma\"", ""),
     ];
-    let mut told = String::new();
+    let mut messages = String::new();
     for (import, _) in cases {
         let error = read(folder.path(), "bench", &table(20, |_| None), Some(import)).expect_err(import);
         let text = error.to_string().replace(&format!("{}/", folder.path().display()), "");
         let advice = error.advice().unwrap_or("-");
-        writeln!(told, "{}\n    [{}] {text}\n    {advice}", import.replace('\n', " | "), error.code().name())
-            .unwrap();
+        writeln!(
+            messages,
+            "{}\n    [{}] {text}\n    {advice}",
+            import.replace('\n', " | "),
+            error.code().name()
+        )
+        .unwrap();
     }
-    insta::assert_snapshot!(told);
+    insta::assert_snapshot!(messages);
 }
 
 #[test]

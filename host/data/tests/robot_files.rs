@@ -56,8 +56,8 @@ fn a_bag_of_ros_2_is_described_and_read() {
         guessed.description
     );
     // The rule of the join is printed, and stays in the description.
-    let told = guessed.description.contains("a row is a message of muscle/pressure_kPa");
-    assert!(told && guessed.description.contains("interpolated linearly"), "{}", guessed.description);
+    let is_described = guessed.description.contains("a row is a message of muscle/pressure_kPa");
+    assert!(is_described && guessed.description.contains("interpolated linearly"), "{}", guessed.description);
     assert!(guessed.description.contains("the log time of each message"), "{}", guessed.description);
     let read = by(&guessed.description, &fixture("ros2.mcap")).unwrap();
     assert_the_rows(&read, EPOCH, 1e-6);
@@ -152,7 +152,7 @@ fn a_pause_of_a_topic_is_not_filled_in() {
 }
 
 #[test]
-fn topics_without_a_common_time_are_told() {
+fn topics_without_a_common_time_are_reported() {
     let mut rows = two_rates(|_| false);
     for (topic, ms, _) in &mut rows {
         *ms += if *topic == "/x" { 5000 } else { 0 };
@@ -162,7 +162,7 @@ fn topics_without_a_common_time_are_told() {
 }
 
 #[test]
-fn files_that_are_not_read_are_told_with_what_helps() {
+fn files_that_are_not_read_are_reported_with_what_helps() {
     let folder = tempfile::tempdir().unwrap();
     for (bytes, said) in [
         (&b"#ROSBAG V2.0\n"[..], "mcap convert"),

@@ -10,7 +10,7 @@ use model_core::link::can::{self as codec, Format, Route, VENT};
 
 use super::Port;
 use super::line_activity::lost;
-use super::slcan::{self, Heard, Parser};
+use super::slcan::{self, Parser, Received};
 use crate::error::DeviceCode;
 use pam_data::error::{Error, Result};
 
@@ -38,7 +38,7 @@ pub(super) struct CanLine {
     sender: Arc<Mutex<codec::Sender>>,
     pending: VecDeque<u8>,
     /// The last answer to a line, until it is taken.
-    answer: Option<Heard>,
+    answer: Option<Received>,
     refused: u64,
     foreign: u64,
 }
@@ -61,12 +61,12 @@ impl CanLine {
         let name = line.adapter.name().to_owned();
         for attempt in 1..=JOINS {
             let (rate, opened) = line.join()?;
-            if rate == Some(Heard::Refused) || opened == Some(Heard::Refused) {
+            if rate == Some(Received::Refused) || opened == Some(Received::Refused) {
                 // A late answer to an earlier line may have been taken for this one's.
                 if attempt < JOINS {
                     continue;
                 }
-                let what = if rate == Some(Heard::Refused) {
+                let what = if rate == Some(Received::Refused) {
                     format!("the CAN adapter refuses {kbit_per_s} kbit/s")
                 } else {
                     "the CAN adapter does not join the bus".to_owned()
@@ -90,7 +90,7 @@ impl CanLine {
     }
 
     /// Closes the channel, sets its bit rate and opens it; gives the answers to the last two.
-    fn join(&mut self) -> Result<(Option<Heard>, Option<Heard>)> {
+    fn join(&mut self) -> Result<(Option<Received>, Option<Received>)> {
         // Ends what an earlier program left unfinished. A channel that is closed already refuses; that answer comes before a pause.
         self.command("\r\r\rC\r")?;
         let deadline = Instant::now() + CLOSING;
@@ -101,7 +101,7 @@ impl CanLine {
     }
 
     /// Sends a line to the adapter and waits for its answer, if it gives any.
-    fn command(&mut self, text: &str) -> Result<Option<Heard>> {
+    fn command(&mut self, text: &str) -> Result<Option<Received>> {
         self.adapter.write_all(text.as_bytes()).map_err(|e| lost(&self.adapter, &e))?;
         let deadline = Instant::now() + ANSWER;
         self.answer = None;
@@ -120,9 +120,9 @@ impl CanLine {
         let count = self.adapter.read(&mut bytes, patience).map_err(|e| lost(&self.adapter, &e))?;
         for byte in &bytes[..count] {
             match self.parser.push(*byte) {
-                Some(said @ (Heard::Done | Heard::Refused)) => self.answer = Some(said),
-                Some(Heard::Foreign) => self.foreign += 1,
-                Some(Heard::Message(..) | Heard::PassedOver) | None => {}
+                Some(said @ (Received::Done | Received::Refused)) => self.answer = Some(said),
+                Some(Received::Foreign) => self.foreign += 1,
+                Some(Received::Message(..) | Received::PassedOver) | None => {}
             }
         }
         Ok(count > 0)
@@ -177,14 +177,14 @@ impl CanLine {
 
     fn take(&mut self, byte: u8) {
         match self.parser.push(byte) {
-            Some(Heard::Message(identifier, data))
+            Some(Received::Message(identifier, data))
                 if Route::of(identifier) == Some(Route::From(self.device)) =>
             {
                 self.pending.extend(self.receiver.take(&data));
             }
-            Some(Heard::Refused) => self.refused += 1,
-            Some(Heard::Foreign) => self.foreign += 1,
-            Some(Heard::Message(..) | Heard::Done | Heard::PassedOver) | None => {}
+            Some(Received::Refused) => self.refused += 1,
+            Some(Received::Foreign) => self.foreign += 1,
+            Some(Received::Message(..) | Received::Done | Received::PassedOver) | None => {}
         }
     }
 

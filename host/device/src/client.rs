@@ -109,9 +109,9 @@ impl Client {
             kept_sequence: None,
             writing: Arc::default(),
         };
-        let mut heard = LineActivity::default();
+        let mut activity = LineActivity::default();
         let mut attempt = 0;
-        while attempt < patience.tries.max(1) || (heard.frames > 0 && attempt < patience.noisy_tries) {
+        while attempt < patience.tries.max(1) || (activity.frames > 0 && attempt < patience.noisy_tries) {
             attempt += 1;
             // A zero ends whatever half frame an earlier program left on the line.
             client.send(&[0])?;
@@ -119,7 +119,7 @@ impl Client {
             let header = Header { kind: Kind::Request, id: hello::ID, sequence };
             let answer = client
                 .transmit(header, &[])
-                .and_then(|()| client.await_answer(hello::ID, sequence, patience.answer, &mut heard))?;
+                .and_then(|()| client.await_answer(hello::ID, sequence, patience.answer, &mut activity))?;
             let Some(answer) = answer else { continue };
             match Hello::from_bytes(&answer.body) {
                 Ok(hello) if answer.header.kind == Kind::Response => {
@@ -137,7 +137,7 @@ impl Client {
                 }
             }
         }
-        Err(heard.error(&client.port))
+        Err(activity.error(&client.port))
     }
 
     /// Whether the device speaks this program's version of the link.

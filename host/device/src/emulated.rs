@@ -76,7 +76,7 @@ pub struct Stand {
 const TICK: f64 = 1e-3;
 
 impl Stand {
-    /// A muscle that is moved as told.
+    /// A muscle that is moved as described.
     #[must_use]
     pub fn new(spec: BenchSpec, motion: Motion) -> Self {
         let plant = Plant::new(&spec, &motion);

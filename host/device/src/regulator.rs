@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_of_rate_is_told_from_a_lag() {
+    fn a_limit_of_rate_is_distinguished_from_a_lag() {
         let (gain, lag, rate) = (1.02, 0.03, 1.5e6);
         let mut seed = 7_u32;
         let mut noise = || {

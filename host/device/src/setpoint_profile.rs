@@ -324,16 +324,16 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let told = |t| SetpointProfile::parse(t, Quantity::Force).unwrap_err().to_string();
-        assert!(told("sinus mean=1").contains("did you mean sine?"));
-        assert!(told("sine mean=1 amplitude=2").contains("needs frequency="));
-        assert!(told("sine mean=1 amplitud=2 frequency=1").contains("did you mean amplitude=?"));
-        assert!(told("sine mean=x amplitude=2 frequency=1").contains("`mean=x`"));
-        assert!(told("sine mean=1 mean=1 amplitude=2 frequency=1").contains("twice"));
-        assert!(told("steps hold=1").contains("at least one"));
-        assert!(told("trapezoid low=1 high=2 ramp=0 hold=1").contains("above zero"));
-        assert!(told("nan").contains("not a number"));
-        assert!(told("").contains("no setpoint profile"));
+        let error = |t| SetpointProfile::parse(t, Quantity::Force).unwrap_err().to_string();
+        assert!(error("sinus mean=1").contains("did you mean sine?"));
+        assert!(error("sine mean=1 amplitude=2").contains("needs frequency="));
+        assert!(error("sine mean=1 amplitud=2 frequency=1").contains("did you mean amplitude=?"));
+        assert!(error("sine mean=x amplitude=2 frequency=1").contains("`mean=x`"));
+        assert!(error("sine mean=1 mean=1 amplitude=2 frequency=1").contains("twice"));
+        assert!(error("steps hold=1").contains("at least one"));
+        assert!(error("trapezoid low=1 high=2 ramp=0 hold=1").contains("above zero"));
+        assert!(error("nan").contains("not a number"));
+        assert!(error("").contains("no setpoint profile"));
     }
 
     #[test]

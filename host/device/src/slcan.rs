@@ -26,7 +26,7 @@ const PASSED_OVER: &[u8] = b"TrRdDbBFVvNnZzALE";
 
 /// What an adapter has said.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Heard {
+pub enum Received {
     /// A standard message with its identifier.
     Message(u16, Vec<u8>),
     /// The last line is done.
@@ -47,16 +47,16 @@ pub struct Parser {
 
 impl Parser {
     /// Takes a byte; gives what a line says at its end.
-    pub fn push(&mut self, byte: u8) -> Option<Heard> {
+    pub fn push(&mut self, byte: u8) -> Option<Received> {
         match byte {
             REFUSED => {
                 self.line.clear();
-                Some(Heard::Refused)
+                Some(Received::Refused)
             }
             END => {
-                let heard = heard(&self.line);
+                let received = received(&self.line);
                 self.line.clear();
-                Some(heard)
+                Some(received)
             }
             // Some adapters end a line with both.
             b'\n' => None,
@@ -71,19 +71,19 @@ impl Parser {
     }
 }
 
-fn heard(line: &[u8]) -> Heard {
+fn received(line: &[u8]) -> Received {
     match line {
-        [] | [b'z' | b'Z'] => Heard::Done,
-        [b't', rest @ ..] => message(rest).unwrap_or(Heard::Foreign),
+        [] | [b'z' | b'Z'] => Received::Done,
+        [b't', rest @ ..] => message(rest).unwrap_or(Received::Foreign),
         [first, ..] if line.len() <= LONGEST && line.is_ascii() && PASSED_OVER.contains(first) => {
-            Heard::PassedOver
+            Received::PassedOver
         }
-        _ => Heard::Foreign,
+        _ => Received::Foreign,
     }
 }
 
 /// A message without its first letter.
-fn message(line: &[u8]) -> Option<Heard> {
+fn message(line: &[u8]) -> Option<Received> {
     let digits: Option<Vec<u8>> = line
         .iter()
         .map(|byte| char::from(*byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok()))
@@ -96,7 +96,7 @@ fn message(line: &[u8]) -> Option<Heard> {
     }
     let identifier = u16::from(*a) << 8 | u16::from(*b) << 4 | u16::from(*c);
     let bytes = data[..2 * length].chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect();
-    (identifier < 0x800).then_some(Heard::Message(identifier, bytes))
+    (identifier < 0x800).then_some(Received::Message(identifier, bytes))
 }
 
 /// The line that sends a message.
@@ -126,7 +126,7 @@ pub const fn bit_rate(kbit_per_s: u16) -> &'static str {
 mod tests {
     use super::*;
 
-    fn all(bytes: &[u8]) -> Vec<Heard> {
+    fn all(bytes: &[u8]) -> Vec<Received> {
         let mut parser = Parser::default();
         bytes.iter().filter_map(|byte| parser.push(*byte)).collect()
     }
@@ -136,26 +136,26 @@ mod tests {
         for length in 0..=8 {
             let data: Vec<u8> = (0..length).map(|n| 0xA0 + n).collect();
             let line = transmit(0x201, &data);
-            assert_eq!(all(line.as_bytes()), [Heard::Message(0x201, data.clone())]);
+            assert_eq!(all(line.as_bytes()), [Received::Message(0x201, data.clone())]);
             let timed = format!("{}1f2e\r", line.trim_end());
-            assert_eq!(all(timed.as_bytes()), [Heard::Message(0x201, data)]);
+            assert_eq!(all(timed.as_bytes()), [Received::Message(0x201, data)]);
         }
         assert_eq!(transmit(0x010, b"VENT all"), "t010856454E5420616C6C\r");
     }
 
     #[test]
-    fn what_an_adapter_says_besides_is_told_apart() {
+    fn what_an_adapter_says_besides_is_distinguished() {
         let said = all(b"\rz\r\x07V1013\rT000000801AA\rt10\x07t2011FF\n\r");
-        let message = Heard::Message(0x201, vec![0xFF]);
+        let message = Received::Message(0x201, vec![0xFF]);
         assert_eq!(
             said,
             [
-                Heard::Done,
-                Heard::Done,
-                Heard::Refused,
-                Heard::PassedOver,
-                Heard::PassedOver,
-                Heard::Refused,
+                Received::Done,
+                Received::Done,
+                Received::Refused,
+                Received::PassedOver,
+                Received::PassedOver,
+                Received::Refused,
                 message
             ]
         );
@@ -180,12 +180,12 @@ mod tests {
             "login: ",
             "t1011\u{e9}",
         ] {
-            assert_eq!(all(format!("{line}\r").as_bytes()), [Heard::Foreign], "{line}");
+            assert_eq!(all(format!("{line}\r").as_bytes()), [Received::Foreign], "{line}");
         }
         let endless = "t1011AA".repeat(100);
         assert_eq!(
             all(format!("{endless}\rt2010\r").as_bytes()),
-            [Heard::Foreign, Heard::Message(0x201, Vec::new())]
+            [Received::Foreign, Received::Message(0x201, Vec::new())]
         );
     }
 
@@ -198,7 +198,7 @@ mod tests {
             let _ = parser.push((state >> 24) as u8);
         }
         let _ = parser.push(END);
-        let said: Vec<Heard> = b"t2010\r".iter().filter_map(|byte| parser.push(*byte)).collect();
-        assert_eq!(said, [Heard::Message(0x201, Vec::new())]);
+        let said: Vec<Received> = b"t2010\r".iter().filter_map(|byte| parser.push(*byte)).collect();
+        assert_eq!(said, [Received::Message(0x201, Vec::new())]);
     }
 }

@@ -31,7 +31,7 @@ pub struct Subscription {
     before: Option<u16>,
     /// Tick of the next sample that this program takes.
     next: Option<u64>,
-    heard: Instant,
+    last_message: Instant,
     requested: Instant,
 }
 
@@ -47,14 +47,14 @@ impl Subscription {
             request(client, sent_ticks)?;
         }
         let now = Instant::now();
-        Ok(Self { every_ticks, sent_ticks, before, next: None, heard: now, requested: now })
+        Ok(Self { every_ticks, sent_ticks, before, next: None, last_message: now, requested: now })
     }
 
     /// Whether a sample is one of this program's: of a finer stream it takes those of its own rate. A gap of the tick counter before
     /// it counts as lost, whatever its cause: the line, the queue of this program or of the device, another program that changed
     /// the stream.
     pub fn takes(&mut self, client: &mut Client, sample: &Telemetry) -> bool {
-        self.heard = Instant::now();
+        self.last_message = Instant::now();
         let missing = self.place(sample.tick);
         if let Some(missing) = missing {
             client.miss(missing);
@@ -64,7 +64,7 @@ impl Subscription {
 
     /// Notes that the stream is alive, for a sample that is of no use.
     pub fn hears(&mut self) {
-        self.heard = Instant::now();
+        self.last_message = Instant::now();
     }
 
     /// Takes the sample of a tick, if it is due; gives how many are missing before it.
@@ -95,7 +95,7 @@ impl Subscription {
     /// What the device refuses, or silence.
     pub fn renew(&mut self, client: &mut Client) -> Result<()> {
         let patience = self.silence(AGAIN);
-        if self.heard.elapsed() > patience && self.requested.elapsed() > patience {
+        if self.last_message.elapsed() > patience && self.requested.elapsed() > patience {
             self.requested = Instant::now();
             // Who had requested it before has ended it.
             (self.before, self.sent_ticks) = (None, self.every_ticks);
@@ -132,8 +132,14 @@ mod tests {
     /// Ticks of the samples that are taken, and how many are missing between them.
     fn taken(every_ticks: u16, ticks: impl IntoIterator<Item = u64>) -> (Vec<u64>, u64) {
         let now = Instant::now();
-        let mut subscription =
-            Subscription { every_ticks, sent_ticks: 1, before: None, next: None, heard: now, requested: now };
+        let mut subscription = Subscription {
+            every_ticks,
+            sent_ticks: 1,
+            before: None,
+            next: None,
+            last_message: now,
+            requested: now,
+        };
         let mut missing = 0;
         let due = |tick: &u64| subscription.place(*tick).inspect(|gap| missing += gap).is_some();
         (ticks.into_iter().filter(due).collect(), missing)
@@ -168,7 +174,7 @@ mod tests {
             sent_ticks: 10_000,
             before: None,
             next: None,
-            heard: now,
+            last_message: now,
             requested: now,
         };
         assert_eq!(slow.silence(Duration::from_secs(2)), Duration::from_secs(30));

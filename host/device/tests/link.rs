@@ -27,7 +27,7 @@ fn image() -> Vec<u8> {
 }
 
 #[test]
-fn a_port_that_nobody_serves_is_told_apart_from_a_silent_one() {
+fn a_port_that_nobody_serves_is_distinguished_from_a_silent_one() {
     // The port multiplexer's, which no one has served for decades and no test can be given.
     let error = connect(&Address::Tcp { host: "127.0.0.1".into(), port: 1 }).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DevicePort);

@@ -106,8 +106,8 @@ fn refuse(mut selection: Selection, place: usize, why: Refusal, library: &[Candi
     selection.without(place, library)
 }
 
-/// Drops effects, the last selected first, that do not reduce the error on held-out rows, and others without which it is lower. Gives the
-/// candidate without which the search should be repeated, because it may have kept others out, and that error.
+/// Drops effects, the last selected first, that do not reduce the error on held-out rows, and others without which it is lower. Gives that
+/// error, and the candidate that may have kept others out: the search is then to be repeated without it.
 fn drop_what_does_not_help(
     mut selection: Selection,
     library: &[Candidate],

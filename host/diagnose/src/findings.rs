@@ -5,7 +5,7 @@ use super::candidate_fit::CandidateFit;
 use super::candidates::Candidate;
 use super::change_point;
 use super::criteria::candidates::{LEAST_SIGMA, SYSTEMATIC_ROWS};
-use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, RELEVANT_SIZE, SIZE_STEP};
+use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, SIZE_STEP};
 use super::criteria::selection::{
     CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_COMPETITOR, SELECTION_FLOOR,
     STATIC_MOVED, STATIC_PEAK,
@@ -14,7 +14,7 @@ use super::intervals::deviations;
 use super::linear::energy;
 use super::rows::Rows;
 use super::selection_step::{self, Selection};
-use super::verdict::{Considered, Missing, ParameterValue, Why, WhyNot};
+use super::verdict::{Considered, Missing, ParameterValue, Why, WhyNot, is_relevant};
 use super::why::{Chance, Evidence};
 
 /// The selected effects with parameters and intervals, what they cannot be distinguished from, and their probabilities.
@@ -121,7 +121,7 @@ pub(crate) fn considered(
                 (by_noise * t.peak / t.size).max(least).max(fitted)
             });
             let hidden = hidden.filter(|h| h.is_finite() && *h < ABSURD_SIZE * blocked);
-            let unseen = hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked);
+            let unseen = is_relevant(hidden, blocked);
             let why_not = if confusable.iter().any(|c| c.as_str() == name) {
                 WhyNot::Confusable
             } else if selection.remarks.iter().any(|r| r.drops(name)) {

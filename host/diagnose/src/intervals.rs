@@ -122,12 +122,12 @@ fn by_strokes(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<O
     let z: Vec<Vec<f64>> = baselines::projected(&columns, rows.root_weight(), &base.span);
     let n = z.len();
     let mut apart = Basis::default();
-    let told: Vec<bool> = z.iter().map(|z| apart.push_beyond(z.clone(), IDENTIFIABLE)).collect();
+    let identifiable: Vec<bool> = z.iter().map(|z| apart.push_beyond(z.clone(), IDENTIFIABLE)).collect();
     let gram: Vec<Vec<f64>> = z.iter().map(|a| z.iter().map(|b| dot(a, b)).collect()).collect();
-    let kept: Vec<usize> = (0..n).filter(|i| told[*i]).collect();
+    let kept: Vec<usize> = (0..n).filter(|i| identifiable[*i]).collect();
     (0..n)
         .map(|i| {
-            if !told[i] {
+            if !identifiable[i] {
                 return None;
             }
             // Its row of the inverse of the gram matrix, then the scatter of the blocks' scores along it.

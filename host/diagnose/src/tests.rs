@@ -91,7 +91,7 @@ fn ask(campaign: &Campaign) -> Diagnosis {
         .expect("an answer")
 }
 
-fn told(campaign: &Campaign, given: &[&str]) -> pam_data::error::Result<Diagnosis> {
+fn diagnosed_with(campaign: &Campaign, given: &[&str]) -> pam_data::error::Result<Diagnosis> {
     let given =
         given.iter().map(|n| pam_fit::bench::Candidate::from_name(n).expect("in the catalogue")).collect();
     diagnose(campaign, &geometry(), &Options { muscle: "test".into(), given, ..Options::default() })
@@ -209,7 +209,7 @@ fn a_reading_now_and_then_late_at_a_turn_is_no_physics() {
 }
 
 #[test]
-fn a_cell_two_samples_late_is_told_from_a_loose_joint() {
+fn a_cell_two_samples_late_is_distinguished_from_a_loose_joint() {
     let d = ask(&delayed(recorded(loops(&[0.2]), 4, coloured(0.1, 2.0), |_, _, _| 0.0), |_| 2));
     assert_eq!(names(&d).first(), Some(&"sensor-delay"), "{:?}", names(&d));
 }
@@ -273,14 +273,14 @@ fn viscous_damping_is_found_with_its_size() {
 fn what_is_given_is_fitted_and_judged_by_the_recordings() {
     let rubbed = recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign);
     // What is there is found with its size whatever else was looked at …
-    let d = told(&rubbed, &["coulomb-friction"]).expect("an answer");
+    let d = diagnosed_with(&rubbed, &["coulomb-friction"]).expect("an answer");
     assert_eq!(names(&d), ["coulomb-friction"]);
     let m = &d.missing[0];
     assert!(m.given && m.supported && m.probability == 1.0, "{:?}", m.why);
     assert!((m.parameters[0].value - 4.0).abs() < 0.3, "{:?}", m.parameters);
     assert!(d.held_out.rms_after_N < 0.5 * d.held_out.rms_before_N, "{:?}", d.held_out);
     // … beside another, of which nothing is there; and what is not there is fitted too, and said not to be supported.
-    let d = told(&rubbed, &["backlash", "coulomb-friction"]).expect("an answer");
+    let d = diagnosed_with(&rubbed, &["backlash", "coulomb-friction"]).expect("an answer");
     assert_eq!(names(&d), ["backlash", "coulomb-friction"]);
     assert!(
         !d.missing[0].supported && d.missing[1].supported,
@@ -290,7 +290,7 @@ fn what_is_given_is_fitted_and_judged_by_the_recordings() {
     );
     assert!((d.missing[1].parameters[0].value - 4.0).abs() < 0.6, "{:?}", d.missing[1].parameters);
     let nothing = recorded(loops(&[0.1, 0.4]), 9, coloured(0.3, 10.0), |_, _, _| 0.0);
-    let d = told(&nothing, &["stress-relaxation"]).expect("an answer");
+    let d = diagnosed_with(&nothing, &["stress-relaxation"]).expect("an answer");
     assert_eq!(names(&d), ["stress-relaxation"]);
     let m = &d.missing[0];
     assert!(!m.supported, "{:?}", m.why);
@@ -300,7 +300,7 @@ fn what_is_given_is_fitted_and_judged_by_the_recordings() {
 #[test]
 fn what_the_base_holds_already_cannot_be_given() {
     let campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
-    let refused = |given: &[&str]| told(&campaign, given).expect_err("refused").to_string();
+    let refused = |given: &[&str]| diagnosed_with(&campaign, given).expect_err("refused").to_string();
     assert!(refused(&["gauge-offset"]).contains("deadband"));
     assert!(refused(&["higher-order-elasticity"]).contains("offered before"));
     assert!(refused(&["backlash", "backlash"]).contains("twice"));

@@ -75,14 +75,14 @@ pub struct Timeline {
 }
 
 fn of_campaign(visit: &Visit, error: Error) -> Error {
-    let told = Error::new(error.code(), format!("campaign `{}`: {}", visit.name, error.cause()));
-    let told = match error.advice() {
-        Some(help) => told.help(help),
-        None => told,
+    let with_campaign = Error::new(error.code(), format!("campaign `{}`: {}", visit.name, error.cause()));
+    let with_campaign = match error.advice() {
+        Some(help) => with_campaign.help(help),
+        None => with_campaign,
     };
     match &error.place().file {
-        Some(file) => told.file(file),
-        None => told,
+        Some(file) => with_campaign.file(file),
+        None => with_campaign,
     }
 }
 

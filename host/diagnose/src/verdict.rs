@@ -6,6 +6,7 @@
 use model_core::effects::{Info, Link, Parameter};
 use serde::Serialize;
 
+use crate::criteria::judgement::RELEVANT_SIZE;
 pub use crate::experiment::Proposal;
 pub use crate::outcome::{Outcome, Pattern, Split, Verdict};
 pub use crate::remark::Remark;
@@ -185,6 +186,19 @@ pub struct Considered {
     pub checked: bool,
     /// Share of its trace that the flexible tables cannot imitate.
     pub visible: f64,
+}
+
+impl Considered {
+    /// Whether it could be hidden in these recordings at a size that matters, by the blocked force, N.
+    #[must_use]
+    pub fn could_be_hidden(&self, blocked: f64) -> bool {
+        is_relevant(self.hidden_up_to_N, blocked)
+    }
+}
+
+/// Whether the size, N, up to which an effect could be hidden is more than [`RELEVANT_SIZE`]; one without a limit is.
+pub(crate) fn is_relevant(hidden: Option<f64>, blocked: f64) -> bool {
+    hidden.is_none_or(|h| h > RELEVANT_SIZE * blocked)
 }
 
 /// One step of the forward selection.

@@ -231,7 +231,7 @@ mod tests {
         let mut table = model_core::table::example();
         let last = table.nodes.len() - 1;
         table.elastic[0][last] -= 3e7;
-        let told = faults(&table, None).join(" ");
-        assert!(told.contains("may not find a pressure"), "{told}");
+        let message = faults(&table, None).join(" ");
+        assert!(message.contains("may not find a pressure"), "{message}");
     }
 }

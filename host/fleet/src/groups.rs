@@ -321,11 +321,11 @@ mod tests {
 
     #[test]
     fn a_different_batch_and_a_late_rig_are_found_and_nothing_else() {
-        let told = |fleet: &Fleet| {
+        let found = |fleet: &Fleet| {
             differences(fleet).0.into_iter().map(|f| format!("{}={}", f.key, f.value)).collect::<Vec<_>>()
         };
-        assert_eq!(told(&fleet(0.0, false)), Vec::<String>::new());
-        assert_eq!(told(&fleet(0.02, false))[0], "batch=B2");
-        assert_eq!(told(&fleet(0.0, true)), ["rig=0"]);
+        assert_eq!(found(&fleet(0.0, false)), Vec::<String>::new());
+        assert_eq!(found(&fleet(0.02, false))[0], "batch=B2");
+        assert_eq!(found(&fleet(0.0, true)), ["rig=0"]);
     }
 }

@@ -284,7 +284,7 @@ mod tests {
             b"muscle,description,files,tags\na,m.toml,a.csv,\n,m.toml,b.csv,\na,m.toml,c.csv,\nd,m.toml,,\ne,,e.csv,\n\
               f,m.toml\ng\xff,m.toml,g.csv,\nh,m.toml,h.csv,batch\ni,m.toml,i.csv,\n",
         );
-        let told: Vec<String> = all
+        let messages: Vec<String> = all
             .iter()
             .map(|e| match e {
                 Entry::Muscle(item) => item.muscle.clone(),
@@ -292,7 +292,7 @@ mod tests {
             })
             .collect();
         assert_eq!(
-            told,
+            messages,
             [
                 "a",
                 "row 3: the row names no muscle",

@@ -318,20 +318,20 @@ mod tests {
     fn a_missing_file_is_an_error_with_its_place_and_part_of_the_key() {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("m.toml"), "x").expect("written");
-        let told = |files: &[&str]| {
+        let messages = |files: &[&str]| {
             let item = item(folder.path(), files);
             let inputs = Inputs::of(&item);
             let text = inputs.error.as_ref().map(ToString::to_string).unwrap_or_default();
             (text, inputs.key(&item, ""))
         };
-        let (missing, before) = told(&["1.csv"]);
+        let (missing, before) = messages(&["1.csv"]);
         assert!(missing.starts_with("cannot be read") && missing.contains("1.csv"), "{missing}");
-        assert!(told(&["*.csv"]).0.contains("no file matches"));
-        assert!(told(&["ftp://x/1.csv"]).0.contains("ftp:// addresses are not supported"));
+        assert!(messages(&["*.csv"]).0.contains("no file matches"));
+        assert!(messages(&["ftp://x/1.csv"]).0.contains("ftp:// addresses are not supported"));
         std::fs::write(folder.path().join("1.csv"), "one").expect("written");
-        let (found, after) = told(&["1.csv"]);
+        let (found, after) = messages(&["1.csv"]);
         assert_eq!(found, "");
         assert_ne!(before, after);
-        assert!(told(&["."]).0.contains("is a folder"));
+        assert!(messages(&["."]).0.contains("is a folder"));
     }
 }

@@ -79,8 +79,8 @@ def test_a_program_that_hangs_does_not_keep_the_muscle_under_pressure():
         samples = device.follow(pressure=200)
         next(samples)
         time.sleep(3)
-        told = refused(lambda: list(samples))
-        assert "took no samples" in str(told), told
+        error = refused(lambda: list(samples))
+        assert "took no samples" in str(error), error
         assert device.info()["state"] == "disarmed"
 
 

@@ -43,8 +43,8 @@ def test_frames_of_every_kind_become_the_same_recording():
     np.testing.assert_allclose(read.force, recording.force, rtol=1e-6, atol=1e-5)
     hole = pandas.DataFrame(columns)
     hole.loc[7, "force_N"] = np.nan
-    told = refused(lambda: pam.from_frame(hole, "hole"))
-    assert told.code == "recording::not-finite" and told.line == 8 and told.column == "force_N" and told.file == "hole", told
+    error = refused(lambda: pam.from_frame(hole, "hole"))
+    assert error.code == "recording::not-finite" and error.line == 8 and error.column == "force_N" and error.file == "hole", error
     (read,) = pam.from_frame(hole, missing="skip")
     assert len(read) == len(recording) - 1
     assert "no column" in str(refused(lambda: pam.from_frame({"time_s": [1.0]}))).lower()

@@ -64,8 +64,8 @@ def test_a_fit_predicts_a_pressure_it_has_not_seen():
 def test_a_prediction_says_how_sure_it_is():
     muscle, campaign = everything()
     table = pam.fit(campaign, muscle).table
-    plain, told = table.predict(campaign), table.predict_with_bands(campaign)
-    for recording, force, one in zip(campaign.recordings, plain, told):
+    plain, banded = table.predict(campaign), table.predict_with_bands(campaign)
+    for recording, force, one in zip(campaign.recordings, plain, banded):
         np.testing.assert_array_equal(one.force, force)
         assert one.band.shape == force.shape and np.all(one.band > 0) and np.all(one.band < 2)
         assert abs(one.rms - np.sqrt(np.mean((recording.force - force) ** 2))) < 1e-9
@@ -107,14 +107,14 @@ def test_the_table_is_evaluated_kept_and_read_back():
         np.testing.assert_array_equal(again.force(np.full(50, 400e3), stroke, 1), shortening)
 
 
-def test_a_force_outside_the_braid_is_refused_and_one_outside_the_recordings_is_told():
+def test_a_force_outside_the_braid_is_refused_and_one_outside_the_recordings_is_reported():
     muscle, campaign = everything()
     table = pam.fit(campaign, muscle).table
     # Shortened by three quarters, and pulled beyond its fibres' length: the equations would give −10⁸ N, and not a word.
     for stroke in [0.75 * muscle.rest_length, -0.2 * muscle.rest_length]:
         for ask in [table.force, table.force_band]:
-            told = refused(lambda: ask(3e5, [1e-3, stroke]))
-            assert told.code == "recording::out-of-range" and "outside the range of this braid" in str(told), told
+            error = refused(lambda: ask(3e5, [1e-3, stroke]))
+            assert error.code == "recording::out-of-range" and "outside the range of this braid" in str(error), error
     assert "outside the range of pneumatic muscles" in str(refused(lambda: table.force(3e11, 1e-3)))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -152,8 +152,8 @@ def test_what_is_wrong_is_said():
         path = os.path.join(folder, "bad.csv")
         with open(path, "w", encoding="utf-8") as file:
             file.write("time_s,pressure_kPa,displacement_mm,force_N\n0,300,0,50\n1,300,0,5o\n")
-        told = refused(lambda: pam.read([path]))
-        assert (told.code, told.file, told.line, told.column) == ("recording::not-a-number", path, 3, "force_N")
+        error = refused(lambda: pam.read([path]))
+        assert (error.code, error.file, error.line, error.column) == ("recording::not-a-number", path, 3, "force_N")
         assert refused(lambda: pam.read([folder + "/none.csv"])).code == "file::unreadable"
         assert "a recording, not a table" in str(refused(lambda: pam.Table.read(path)))
     two = np.zeros((20, 2))
@@ -180,8 +180,8 @@ def test_wrong_arrays_and_options_are_refused_by_name():
     time, pressure, stroke, force = np.arange(100) * 0.01, np.full(100, 3e5), np.linspace(0, 1e-3, 100), np.linspace(50, 20, 100)
     hole = force.copy()
     hole[7] = np.nan
-    told = refused(lambda: pam.Recording("a", time, pressure, stroke, hole))
-    assert "row 8" in str(told) and "recording `a`" in str(told), told
+    error = refused(lambda: pam.Recording("a", time, pressure, stroke, hole))
+    assert "row 8" in str(error) and "recording `a`" in str(error), error
     assert "complex" in str(refused(lambda: pam.Recording("a", time, pressure, stroke, force + 1j)))
     assert "time does not increase" in str(refused(lambda: pam.Recording("a", time[::-1], pressure, stroke, force)))
     assert "50 rows" in str(refused(lambda: pam.Recording("a", time, pressure, stroke[:50], force)))
@@ -210,15 +210,15 @@ def test_the_listing_of_the_book_runs():
 def test_stubs_and_help_name_what_there_is():
     stubs = ast.parse((pathlib.Path(__file__).parent.parent / "python/pamtools/_native.pyi").read_text())
     public = lambda names: {n for n in names if not n.startswith("_")}
-    told = {}
+    documented = {}
     for node in stubs.body:
         if isinstance(node, ast.ClassDef):
-            told[node.name] = public(n.name for n in node.body if isinstance(n, ast.FunctionDef))
+            documented[node.name] = public(n.name for n in node.body if isinstance(n, ast.FunctionDef))
         elif isinstance(node, ast.FunctionDef):
-            told[node.name] = set()
+            documented[node.name] = set()
     native = pam.fit.__module__ and __import__("pamtools._native", fromlist=["_native"])
-    assert public(vars(native)) == set(told)
-    for name, members in told.items():
+    assert public(vars(native)) == set(documented)
+    for name, members in documented.items():
         thing = getattr(native, name)
         assert thing.__doc__, f"{name} has no docstring"
         if name not in {"PamError"} and isinstance(thing, type):

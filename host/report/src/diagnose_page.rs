@@ -392,10 +392,10 @@ fn remains(d: &Diagnosis) -> Section {
     let hidden: Vec<String> = d
         .considered
         .iter()
-        .filter_map(|c| match c.hidden_up_to_N {
-            Some(h) if h <= 0.02 * d.blocked_force_N => None,
-            Some(h) => Some(format!("`{}` up to {} N", c.effect, figures(h, 2))),
-            None => Some(format!("`{}` of any size", c.effect)),
+        .filter(|c| !c.checked && c.could_be_hidden(d.blocked_force_N))
+        .map(|c| match c.hidden_up_to_N {
+            Some(h) => format!("`{}` up to {} N", c.effect, figures(h, 2)),
+            None => format!("`{}` of any size", c.effect),
         })
         .collect();
     if !hidden.is_empty() {

@@ -289,7 +289,7 @@ impl Figure {
         Self::multiples(id, title, reading, vec![panel])
     }
 
-    /// A picture of several panels, each with its own ends until told otherwise.
+    /// A picture of several panels, each with its own ends unless they are set.
     pub fn multiples(
         id: impl Into<String>,
         title: impl Into<String>,

@@ -155,15 +155,15 @@ mod tests {
                 };
                 let defined =
                     info.equation.contains(&format!(", {name} =")) || WORDS.contains(&name.as_str());
-                let told =
+                let explained =
                     table.rows.iter().any(|r| is(&r[0])) || info.parameters.iter().any(|p| is(p.letter));
-                assert!(defined || told, "{}: {name} is not explained", info.name);
+                assert!(defined || explained, "{}: {name} is not explained", info.name);
             }
         }
     }
 
     #[test]
-    fn the_force_on_the_right_is_told_from_that_on_the_left() {
+    fn the_force_on_the_right_is_distinguished_from_that_on_the_left() {
         let rows = |name| symbols(Candidate::from_name(name).unwrap().info()).rows;
         assert_eq!(rows("force-offset").len(), 1);
         assert_eq!(rows("force-gain")[1][0], "F on the right");
@@ -172,8 +172,8 @@ mod tests {
 
     #[test]
     fn a_letter_that_is_a_parameter_is_left_to_it() {
-        let told =
+        let explained =
             |name| symbols(Candidate::from_name(name).unwrap().info()).rows.iter().any(|r| r[0] == "m");
-        assert!(told("breakaway-friction") && !told("gravity"));
+        assert!(explained("breakaway-friction") && !explained("gravity"));
     }
 }

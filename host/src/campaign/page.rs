@@ -1,4 +1,4 @@
-//! The page of a campaign: its course, what each step told, the table, the diagnosis, force tracking.
+//! The page of a campaign: its course, what each step showed, the table, the diagnosis, force tracking.
 
 use pam_campaign::campaign::Done;
 use pam_campaign::engine::Engine;
@@ -9,40 +9,40 @@ use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, wordin
 use crate::documents::campaign as document;
 
 /// Builds the page.
-pub(crate) fn page(engine: &Engine, course: &[Done], told: &document::Campaign) -> Page {
-    let mut page = Page::new("A campaign that chose its own steps", told.muscle.clone());
-    let tone = if told.complete && settled(engine, told) { Tone::Good } else { Tone::Caution };
+pub(crate) fn page(engine: &Engine, course: &[Done], result: &document::Campaign) -> Page {
+    let mut page = Page::new("A campaign that chose its own steps", result.muscle.clone());
+    let tone = if result.complete && settled(engine, result) { Tone::Good } else { Tone::Caution };
     let diagnosis = engine.diagnosis().map_or(String::new(), |d| format!(" {}", wording::verdict(d)));
-    page.verdict(tone, format!("{}{diagnosis}", told.ended_by));
+    page.verdict(tone, format!("{}{diagnosis}", result.ended_by));
     page.fact(
         "bench time",
-        format!("{:.1} min", told.bench_s / 60.0),
-        format!("of {:.0} min", told.minutes),
+        format!("{:.1} min", result.bench_s / 60.0),
+        format!("of {:.0} min", result.minutes),
         Tone::Plain,
     );
-    page.fact("steps", told.steps.len().to_string(), "recorded", Tone::Plain);
-    if let Some(t) = &told.table {
+    page.fact("steps", result.steps.len().to_string(), "recorded", Tone::Plain);
+    if let Some(t) = &result.table {
         page.fact("P_{0}", format!("{:.1} kPa", t.deadband_kPa), "deadband", Tone::Plain);
         page.fact("fit", format!("{:.2} %", t.mean_error_pct), "mean error, of blocked force", Tone::Plain);
     }
-    page.push(course_section(told));
-    page.push(time_section(engine, course, told));
+    page.push(course_section(result));
+    page.push(time_section(engine, course, result));
     if let Some(diagnosis) = engine.diagnosis() {
         page.push(diagnosis_section(diagnosis));
     }
-    page.push(table_section(told));
-    page.push(tracking_section(told));
-    page.origin("controller", told.controller.clone());
+    page.push(table_section(result));
+    page.push(tracking_section(result));
+    page.origin("controller", result.controller.clone());
     page.origin("program", format!("host {}", env!("CARGO_PKG_VERSION")));
-    for step in &told.steps {
+    for step in &result.steps {
         page.origin(step.file.clone(), format!("{} rows", step.rows));
     }
     page
 }
 
 /// Whether the table has the target error and the model explains the recordings.
-fn settled(engine: &Engine, told: &document::Campaign) -> bool {
-    let error = told.table.as_ref().and_then(|t| Some((t.predicted_error_pct?, t.wanted_error_pct)));
+fn settled(engine: &Engine, result: &document::Campaign) -> bool {
+    let error = result.table.as_ref().and_then(|t| Some((t.predicted_error_pct?, t.wanted_error_pct)));
     let known = error.is_none_or(|(predicted, wanted)| predicted <= wanted);
     let explained =
         |d: &Diagnosis| d.judged() && matches!(d.verdict(), Verdict::Consistent | Verdict::Explained);
@@ -65,14 +65,14 @@ fn diagnosis_section(diagnosis: &Diagnosis) -> Section {
     section
 }
 
-fn course_section(told: &document::Campaign) -> Section {
+fn course_section(result: &document::Campaign) -> Section {
     let mut section = Section::new("Course");
     section.text(
         "Each step is the one that was expected to tell most per second: about the table, about which effect is missing, and about effects \
          that nothing had shown yet. The first steps are the same in every campaign.",
     );
-    let mut table = Table::new("Steps in order", &["step", "from, s", "what", "why", "what it told"]);
-    for s in &told.steps {
+    let mut table = Table::new("Steps in order", &["step", "from, s", "what", "why", "what it showed"]);
+    for s in &result.steps {
         let repeated = if s.spoiled.is_empty() {
             String::new()
         } else {
@@ -83,7 +83,7 @@ fn course_section(told: &document::Campaign) -> Section {
             format!("{:.0}", s.begin_s),
             s.what.clone(),
             s.why.clone(),
-            format!("{}{repeated}", s.told),
+            format!("{}{repeated}", s.finding),
         ]);
     }
     section.table(table);
@@ -91,7 +91,7 @@ fn course_section(told: &document::Campaign) -> Section {
 }
 
 /// Pressure and stroke over the campaign, and the predicted error.
-fn time_section(engine: &Engine, course: &[Done], told: &document::Campaign) -> Section {
+fn time_section(engine: &Engine, course: &[Done], result: &document::Campaign) -> Section {
     let mut section = Section::new("Recordings");
     let (mut time, mut pressure, mut stroke) = (Vec::new(), Vec::new(), Vec::new());
     for r in engine.recordings() {
@@ -123,10 +123,10 @@ fn time_section(engine: &Engine, course: &[Done], told: &document::Campaign) -> 
         .map(|d| (d.clock_s.0, 100.0 * d.chosen.predicted_error / engine.places().blocked.max(1e-9)))
         .collect();
     // Each step begins with the error that was expected before it; the last one is known at the end.
-    known.extend(told.table.as_ref().and_then(|t| Some((told.bench_s, t.predicted_error_pct?))));
+    known.extend(result.table.as_ref().and_then(|t| Some((result.bench_s, t.predicted_error_pct?))));
     if known.len() > 1 {
         let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
-        let wanted = told.table.as_ref().map_or(0.0, |t| t.wanted_error_pct);
+        let wanted = result.table.as_ref().map_or(0.0, |t| t.wanted_error_pct);
         let panel =
             Panel::new(Axis::new("time", "s"), Axis::new("expected error", "% of blocked force").from_zero())
                 .line("expected", Colour::Series(0), &x, &y)
@@ -141,9 +141,9 @@ fn time_section(engine: &Engine, course: &[Done], told: &document::Campaign) -> 
     section
 }
 
-fn table_section(told: &document::Campaign) -> Section {
+fn table_section(result: &document::Campaign) -> Section {
     let mut section = Section::new("Table");
-    let Some(t) = &told.table else {
+    let Some(t) = &result.table else {
         section.text("The recordings do not determine a table yet.");
         return section;
     };
@@ -175,16 +175,16 @@ fn table_section(told: &document::Campaign) -> Section {
     section
 }
 
-fn tracking_section(told: &document::Campaign) -> Section {
+fn tracking_section(result: &document::Campaign) -> Section {
     let mut section = Section::new("Force tracking before and after");
-    if told.tracking.is_empty() {
+    if result.tracking.is_empty() {
         return section;
     }
     let mut table = Table::new(
         "A sine of 0.5 Hz, rms error after the first second",
         &["feed-forward", "N", "% of blocked force"],
     );
-    for t in &told.tracking {
+    for t in &result.tracking {
         table.row([t.feed_forward.clone(), format!("{:.2}", t.rms_N), format!("{:.2}", t.rms_pct)]);
     }
     section.table(table);

@@ -60,7 +60,7 @@ pub(crate) fn pages(engine: &Engine, folder: &Path) -> Result<()> {
 }
 
 /// What the call was, and how it ended.
-pub(crate) struct Told<'a> {
+pub(crate) struct RunFacts<'a> {
     pub(crate) controller: &'a str,
     pub(crate) purpose: &'a str,
     pub(crate) minutes: f64,
@@ -76,7 +76,7 @@ fn step(done: &Done) -> document::Step {
         name: c.step.name(),
         what: c.step.words(),
         why: c.why.clone(),
-        told: done.told.clone(),
+        finding: done.finding.clone(),
         file: done.file.clone(),
         rows: done.rows,
         begin_s: done.clock_s.0,
@@ -94,7 +94,7 @@ fn step(done: &Done) -> document::Step {
 }
 
 /// The document.
-pub(crate) fn document(engine: &Engine, course: &[Done], told: &Told<'_>) -> document::Campaign {
+pub(crate) fn document(engine: &Engine, course: &[Done], facts: &RunFacts<'_>) -> document::Campaign {
     let blocked = engine.places().blocked.max(1e-9);
     let percent = |newtons: f64| 100.0 * newtons / blocked;
     let table = engine.findings().map(|f| {
@@ -126,16 +126,16 @@ pub(crate) fn document(engine: &Engine, course: &[Done], told: &Told<'_>) -> doc
     document::Campaign {
         schema: "pam-campaign/1",
         muscle: engine.muscle().name.clone(),
-        controller: told.controller.to_owned(),
-        purpose: told.purpose.to_owned(),
-        minutes: told.minutes,
+        controller: facts.controller.to_owned(),
+        purpose: facts.purpose.to_owned(),
+        minutes: facts.minutes,
         bench_s: course.iter().map(|d| d.clock_s.1 - d.clock_s.0).sum(),
-        complete: told.complete,
-        ended_by: told.ended_by.to_owned(),
+        complete: facts.complete,
+        ended_by: facts.ended_by.to_owned(),
         steps: course.iter().map(step).collect(),
         table,
         diagnosis,
-        tracking: told
+        tracking: facts
             .tracking
             .iter()
             .map(|(name, rms)| document::Tracking {

@@ -185,14 +185,14 @@ pub(crate) fn tracked(rigging: &mut Rigging, table: &TableFile) -> Result<Vec<(&
     let image = image::write(&table.table, &mut buffer)
         .map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
     tables::write(client, Side::Agonist, image, |_| ())?;
-    let mut told = Vec::new();
+    let mut errors = Vec::new();
     for law in [Law::Gaylord, Law::Table] {
         choose(client, law, 1.0)?;
         axis.go(0.0, 1e-2);
         let track = track(client, law, Task::Sine, 0.35 * blocked, |_| ())?;
-        told.push((law.name(), track.rms));
+        errors.push((law.name(), track.rms));
     }
-    Ok(told)
+    Ok(errors)
 }
 
 #[cfg(test)]

@@ -77,7 +77,7 @@ impl Observer for Watching<'_> {
     fn done(&mut self, done: &Done) {
         self.line = None;
         self.spent_s += done.clock_s.1 - done.clock_s.0;
-        self.console.note(format!("    {}. {}", pluralise(done.rows, "row"), done.told));
+        self.console.note(format!("    {}. {}", pluralise(done.rows, "row"), done.finding));
         if let Some(picture) = picture(&self.forces) {
             self.console.note(format!("    {picture}"));
         }

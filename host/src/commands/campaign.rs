@@ -10,7 +10,7 @@ use super::interrupt::interrupts;
 use super::port::PortOption;
 use super::recording_files::positive;
 use crate::campaign::page::page;
-use crate::campaign::results::{Told, document, pages, table};
+use crate::campaign::results::{RunFacts, document, pages, table};
 use crate::campaign::rigging::{Rigging, emulated, real, tracked};
 use crate::campaign::watching::Watching;
 use crate::console::Console;
@@ -143,7 +143,7 @@ impl Arguments {
                 (false, "The campaign was interrupted; the same call continues it.".to_owned())
             }
         };
-        let told = Told {
+        let facts = RunFacts {
             controller: &rigging.words.clone(),
             purpose: purpose_name,
             minutes: self.minutes,
@@ -151,7 +151,7 @@ impl Arguments {
             ended_by: &reason,
             tracking: Vec::new(),
         };
-        self.results(&mut engine, &mut rigging, &course, told, console)
+        self.results(&mut engine, &mut rigging, &course, facts, console)
     }
 
     fn rigging(&self, continued: bool, interrupted: &Arc<AtomicBool>, console: &Console) -> Result<Rigging> {
@@ -174,30 +174,30 @@ impl Arguments {
         engine: &mut Engine,
         rigging: &mut Rigging,
         course: &[Done],
-        mut told: Told<'_>,
+        mut facts: RunFacts<'_>,
         console: &Console,
     ) -> Result<()> {
-        if told.complete && engine.findings().is_some() {
+        if facts.complete && engine.findings().is_some() {
             engine.diagnose()?;
         }
         let table = table(engine, &self.output)?;
-        told.tracking = match &table {
-            Some(table) if told.complete => tracked(rigging, table)?,
+        facts.tracking = match &table {
+            Some(table) if facts.complete => tracked(rigging, table)?,
             _ => Vec::new(),
         };
         pages(engine, &self.output)?;
-        let document = document(engine, course, &told);
+        let document = document(engine, course, &facts);
         let json = text(&document)?;
         write_whole(&self.output.join("campaign.json"), format!("{json}\n").as_bytes())?;
         let report = self.output.join("report.html");
         write_whole(&report, in_page(page(engine, course, &document).html()).as_bytes())?;
-        if let (Some(before), true) = (&self.reference, told.complete) {
+        if let (Some(before), true) = (&self.reference, facts.complete) {
             self.changed(engine, before, console)?;
         }
         if self.json {
             console.result(json);
         } else {
-            console.result(told.ended_by);
+            console.result(facts.ended_by);
             if let Some(t) = &document.table {
                 console.result(format!(
                     "table: deadband {:.1} kPa, blocked force {:.1} N, mean error {:.2} % of it, in {}",

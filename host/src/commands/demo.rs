@@ -105,11 +105,11 @@ impl Arguments {
         };
         let emulated = Emulated::start(stand, only, f64::from(SPEED))?;
         step(3, format!("controller started: {}", emulated.words()));
-        let told =
+        let run =
             self.control(&emulated, &table, &made, step, console).map_err(|e| with_log(e, &emulated))?;
         drop(emulated);
 
-        let telemetry = read_back(&told, &table, &muscle)?;
+        let telemetry = read_back(&run, &table, &muscle)?;
         step(
             6,
             format!(
@@ -123,9 +123,9 @@ impl Arguments {
             muscle: &made.bench.muscle.name,
             campaign: &campaign,
             fit: &fitted,
-            controller: &told.controller,
-            device: told.device.clone(),
-            tracks: &told.tracks,
+            controller: &run.controller,
+            device: run.device.clone(),
+            tracks: &run.tracks,
             blocked_force: blocked,
             telemetry,
             seconds: began.elapsed().as_secs_f64(),
@@ -151,7 +151,7 @@ impl Arguments {
         made: &Made,
         step: impl Fn(u32, String),
         console: &Console,
-    ) -> Result<Told> {
+    ) -> Result<ControllerRun> {
         let mut client = Client::open(emulated.address())?;
         // The watch counts device time, which goes so much faster, and twice as fast again after a pause of a busy machine.
         let mut settings = client.call::<GetSettings>(&())?;
@@ -216,7 +216,7 @@ impl Arguments {
                 losses.samples
             ),
         );
-        Ok(Told { controller: emulated.words(), device, tracks, recordings })
+        Ok(ControllerRun { controller: emulated.words(), device, tracks, recordings })
     }
 
     fn keep(&self, client: &mut Client, track: &Track) -> Result<PathBuf> {
@@ -232,7 +232,7 @@ impl Arguments {
 }
 
 /// What the controller did.
-struct Told {
+struct ControllerRun {
     controller: String,
     device: String,
     tracks: Vec<Track>,
@@ -270,8 +270,8 @@ fn fit_campaign(made: &Made, folder: &Path) -> Result<(MuscleDescription, Campai
 /// Reads the telemetry as recordings: the table's error on it, N, and over how many rows.
 ///
 /// No table is fitted to it: the few millimetres that the bench moves the muscle determine neither P0 nor elasticity.
-fn read_back(told: &Told, table: &TableFile, muscle: &MuscleDescription) -> Result<(f64, usize)> {
-    let campaign = Reader::of(muscle).campaign(&told.recordings)?;
+fn read_back(run: &ControllerRun, table: &TableFile, muscle: &MuscleDescription) -> Result<(f64, usize)> {
+    let campaign = Reader::of(muscle).campaign(&run.recordings)?;
     let prediction = predict(table, &campaign)?;
     let tested = &table.table.tested;
     let inside = f64::from(tested.pressure_low.pascals())..=f64::from(tested.pressure_high.pascals());

@@ -115,8 +115,8 @@ impl Arguments {
                 match scored {
                     Ok(held) => Some(held),
                     Err(e) => {
-                        let told = failure.as_ref().is_some_and(|f| f.to_string() == e.to_string());
-                        if !told {
+                        let reported = failure.as_ref().is_some_and(|f| f.to_string() == e.to_string());
+                        if !reported {
                             console.warning(format!("{}: {e}", muscle.name));
                         }
                         failure.get_or_insert(e);

@@ -110,14 +110,14 @@ mod tests {
         assert_eq!(chosen(&names(&["/dev/ttyACM0"]), never).unwrap(), "/dev/ttyACM0");
         let three = names(&["/dev/ttyACM0", "/dev/ttyUSB0", "/dev/ttyUSB1"]);
         assert_eq!(chosen(&three, |name| name.ends_with("B1")).unwrap(), "/dev/ttyUSB1");
-        let told = |error: Error| (error.cause().to_owned(), error.advice().unwrap_or_default().to_owned());
-        let (cause, help) = told(chosen(&three, |_| false).unwrap_err());
+        let parts = |error: Error| (error.cause().to_owned(), error.advice().unwrap_or_default().to_owned());
+        let (cause, help) = parts(chosen(&three, |_| false).unwrap_err());
         assert!(
             cause.contains("3 USB serial devices, none of which") && help.contains("ttyUSB0"),
             "{cause} {help}"
         );
-        let (cause, help) = told(chosen(&three, |name| name.contains("USB")).unwrap_err());
+        let (cause, help) = parts(chosen(&three, |name| name.contains("USB")).unwrap_err());
         assert!(cause.contains("2 controllers") && !help.contains("ttyACM0"), "{cause} {help}");
-        assert!(told(chosen(&[], never).unwrap_err()).0.contains("no USB serial device"));
+        assert!(parts(chosen(&[], never).unwrap_err()).0.contains("no USB serial device"));
     }
 }

@@ -38,8 +38,9 @@ pub(crate) struct Step {
     pub what: String,
     /// Why it was chosen, in one sentence.
     pub why: String,
-    /// What it told.
-    pub told: String,
+    /// What it showed, as text.
+    #[serde(rename = "told")]
+    pub finding: String,
     pub file: String,
     pub rows: u64,
     pub begin_s: f64,

@@ -24,12 +24,12 @@ function showStep(step) {
 const way = () => $("cal-way").value;
 const mass = () => way() === "weights";
 function ways() {
-  const sensor = $("cal-sensor").value, told = ADVICE[sensor] ?? { zero: "Apply the value 0 to the sensor.", two: "Apply two values that a reference shows." };
+  const sensor = $("cal-sensor").value, advice = ADVICE[sensor] ?? { zero: "Apply the value 0 to the sensor.", two: "Apply two values that a reference shows." };
   const labels = { zero: "its zero only", two: "two known values", weights: "known weights" };
   const before = way();
-  $("cal-way").replaceChildren(...Object.keys(told).map((w) => new Option(labels[w], w)));
-  if (told[before]) $("cal-way").value = before;
-  $("cal-advice").textContent = told[way()];
+  $("cal-way").replaceChildren(...Object.keys(advice).map((w) => new Option(labels[w], w)));
+  if (advice[before]) $("cal-way").value = before;
+  $("cal-advice").textContent = advice[way()];
   guided.pairs = way() === "zero" ? [0] : way() === "two" ? [0, ""] : [0, "", ""];
   guided.pairs = guided.pairs.map((value) => ({ value: String(value), signal: null, error: null }));
   showPairs();

@@ -33,17 +33,17 @@ function keepPanels() { localStorage.setItem(CHOICE, JSON.stringify(panels.map((
 
 function addPanel(y = "e", x = "time") {
   const figure = document.createElement("figure"), caption = document.createElement("figcaption"), scope = document.createElement("div");
-  const canvas = document.createElement("canvas"), line = document.createElement("i"), told = document.createElement("span"), away = document.createElement("button");
+  const canvas = document.createElement("canvas"), line = document.createElement("i"), note = document.createElement("span"), away = document.createElement("button");
   const signals = () => Object.entries(SIGNALS).map(([id, s]) => new Option(s.label + (s.unit ? `, ${s.unit}` : ""), id));
-  const panel = { figure, canvas, told, y: document.createElement("select"), x: document.createElement("select") };
+  const panel = { figure, canvas, note, y: document.createElement("select"), x: document.createElement("select") };
   panel.y.replaceChildren(...signals());
   panel.x.replaceChildren(new Option("over time", "time"), new Option("spectrum", "spectrum"), ...Object.entries(SIGNALS).map(([id, s]) => new Option("against " + s.label, id)));
   panel.y.value = y; panel.x.value = x;
   panel.y.setAttribute("aria-label", "signal"); panel.x.setAttribute("aria-label", "shown as");
-  scope.className = "scope"; line.className = "cursor"; line.hidden = true; told.className = "quiet";
+  scope.className = "scope"; line.className = "cursor"; line.hidden = true; note.className = "quiet";
   canvas.tabIndex = 0;
   away.type = "button"; away.textContent = "Remove"; away.className = "small";
-  caption.className = "row"; caption.append(panel.y, panel.x, told, away);
+  caption.className = "row"; caption.append(panel.y, panel.x, note, away);
   scope.append(canvas, line); figure.append(caption, scope);
   const choose = () => {
     const label = `${SIGNALS[panel.y.value].label} ${panel.x.selectedOptions[0].textContent}`;
@@ -72,7 +72,7 @@ function drawPanels(from, to, whole) {
       p.drawn = now;
       p.scope.draw(from, to);
       const unit = SIGNALS[p.y.value].unit, peak = p.scope.peak;
-      p.told.textContent = peak ? `largest ${peak.amplitude.toPrecision(3)} ${unit} at ${peak.frequency.toFixed(2)} Hz` : "needs 64 evenly spaced samples";
+      p.note.textContent = peak ? `largest ${peak.amplitude.toPrecision(3)} ${unit} at ${peak.frequency.toFixed(2)} Hz` : "needs 64 evenly spaced samples";
     }
   }
 }

@@ -119,7 +119,7 @@ fn campaign(bench: &BenchSpec) -> Campaign {
     Campaign::new(bench_campaign::recordings(&files))
 }
 
-fn asked(bench: &BenchSpec, checks: Checks) -> Diagnosis {
+fn diagnosed(bench: &BenchSpec, checks: Checks) -> Diagnosis {
     let description = MuscleDescription::parse(&bench.muscle.description()).expect("a description");
     let options = Options { muscle: "mini".into(), checks, ..Options::default() };
     diagnose(&campaign(bench), &description.geometry(), &options).expect("a diagnosis")
@@ -129,7 +129,7 @@ fn asked(bench: &BenchSpec, checks: Checks) -> Diagnosis {
 fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     let mut faulty = bench();
     faulty.instruments.force.gain = 0.04;
-    let answer = asked(&faulty, read(&faulty));
+    let answer = diagnosed(&faulty, read(&faulty));
     let named: Vec<&str> = answer.missing.iter().map(|m| m.effect.as_str()).collect();
     assert_eq!(named, ["force-gain"]);
     let gain = &answer.missing[0];
@@ -142,7 +142,7 @@ fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     assert!(cleared.hidden_up_to_N.is_some_and(|h| h < 0.01 * answer.blocked_force_N));
     // A bench that is sound leaves the muscle's diagnosis as it was.
     let sound = bench();
-    assert!(asked(&sound, read(&sound)).missing.is_empty());
+    assert!(diagnosed(&sound, read(&sound)).missing.is_empty());
 }
 
 #[test]

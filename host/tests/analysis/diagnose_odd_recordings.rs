@@ -389,7 +389,7 @@ fn all(rows: usize, column: usize, damage: &Damage) -> Vec<Sheet> {
 
 /// A sensor that is dead in every file is never "the model agrees".
 #[test]
-fn dead_sensors_are_told() {
+fn dead_sensors_are_reported() {
     for (what, column) in [("pressure", 1), ("stroke", 2), ("force", 3)] {
         let folder: PathBuf = tempfile::tempdir().unwrap().keep();
         let sheets = all(150, column, &Damage::Scaled(0.0));

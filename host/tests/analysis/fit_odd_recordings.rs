@@ -281,8 +281,8 @@ fn a_recording_in_another_unit_does_no_harm() {
 
 /// A campaign that is wrong throughout cannot stand apart from itself; its fit says what it looks like.
 #[test]
-fn absolute_pressure_and_a_force_of_the_other_sign_are_told() {
-    let told = |spoil: &dyn Fn(&mut Recording), word: &str| {
+fn absolute_pressure_and_a_force_of_the_other_sign_are_reported() {
+    let is_reported = |spoil: &dyn Fn(&mut Recording), word: &str| {
         let mut noise = Noise::new(8, 0.0);
         let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
         recordings.iter_mut().for_each(spoil);
@@ -290,16 +290,16 @@ fn absolute_pressure_and_a_force_of_the_other_sign_are_told() {
         found.summary.warnings.iter().any(|w| w.contains(word))
     };
     let absolute = "absolute pressure";
-    assert!(told(&|r| r.pressure.iter_mut().for_each(|p| *p += 101_325.0), absolute));
-    assert!(!told(&|_| (), absolute));
+    assert!(is_reported(&|r| r.pressure.iter_mut().for_each(|p| *p += 101_325.0), absolute));
+    assert!(!is_reported(&|_| (), absolute));
     let sign = "positive as the muscle pulls";
-    assert!(told(&|r| r.force.iter_mut().flatten().for_each(|f| *f = -*f), sign));
-    assert!(!told(&|_| (), sign));
+    assert!(is_reported(&|r| r.force.iter_mut().flatten().for_each(|f| *f = -*f), sign));
+    assert!(!is_reported(&|_| (), sign));
 }
 
 /// Where no table comes out, the error says by how much force and pressure disagree with the braid.
 #[test]
-fn a_campaign_in_another_unit_throughout_is_told_by_how_much() {
+fn a_campaign_in_another_unit_throughout_is_reported_by_how_much() {
     let mut noise = Noise::new(11, 0.0);
     let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
     recordings.iter_mut().for_each(|r| r.pressure.iter_mut().for_each(|p| *p /= 100.0));
@@ -325,7 +325,7 @@ fn a_recording_in_grams_is_left_out_and_sets_no_scale() {
 
 /// A motion that no braid permits is reported with the recording and the time.
 #[test]
-fn a_stroke_of_the_other_sign_is_told_with_its_place() {
+fn a_stroke_of_the_other_sign_is_reported_with_its_place() {
     let mut noise = Noise::new(9, 0.0);
     let mut recordings = SIX.map(|p| strokes(p, 3000, 100.0, 0.0, 0, (0.05, &mut noise))).to_vec();
     for r in &mut recordings {
@@ -334,9 +334,9 @@ fn a_stroke_of_the_other_sign_is_told_with_its_place() {
     // One file among others is known by its disagreement, and left out.
     let mut one = recordings.clone();
     one[2].stroke.iter_mut().for_each(|x| *x = -*x);
-    let told =
+    let message =
         fit(&Campaign::new(one), &description(), &Options::default()).unwrap().summary.warnings.join("; ");
-    assert!(told.contains("its stroke agrees with theirs with the opposite sign"), "{told}");
+    assert!(message.contains("its stroke agrees with theirs with the opposite sign"), "{message}");
     recordings.truncate(1);
     recordings[0].stroke.iter_mut().for_each(|x| *x = -*x);
     let error = fit(&Campaign::new(recordings.clone()), &description(), &Options::default()).unwrap_err();

@@ -46,10 +46,10 @@ fn described_dimensions_stay_where_others_describe_the_force_no_better() {
     let kept = fit(&campaign, &muscle, &Options { as_described: true, ..Options::default() }).unwrap();
     assert!(fitted.summary.adjusted.is_empty(), "{:?}", fitted.summary.adjusted);
     assert_eq!(fitted.summary.rms_N, kept.summary.rms_N);
-    let told = fitted.summary.to_string() + &fitted.summary.warnings.join("\n");
-    assert!(told.contains("held lengths (3 mountings)"), "{told}");
+    let text = fitted.summary.to_string() + &fitted.summary.warnings.join("\n");
+    assert!(text.contains("held lengths (3 mountings)"), "{text}");
     for advice in ["longer stroke", "slow stroke"] {
-        assert!(!told.contains(advice), "{advice:?} is no advice for held lengths: {told}");
+        assert!(!text.contains(advice), "{advice:?} is no advice for held lengths: {text}");
     }
 }
 
@@ -71,15 +71,15 @@ fn a_table_without_faults_is_taken_where_other_dimensions_give_one() {
 
 /// Fitted dimensions can make up for a factor of the force; then only the described ones show it.
 #[test]
-fn a_force_in_another_unit_is_told_though_fitted_dimensions_describe_it() {
+fn a_force_in_another_unit_is_reported_though_fitted_dimensions_describe_it() {
     let spec = presets::contractile();
-    let told = |per_newton: f64| {
+    let warns = |per_newton: f64| {
         let mut recordings = staircases(&spec, 1).recordings;
         recordings.iter_mut().flat_map(|r| r.force.iter_mut().flatten()).for_each(|f| *f *= per_newton);
         let found = fit(&Campaign::new(recordings), &description(&spec), &Options::default()).unwrap();
         found.summary.warnings.iter().any(|w| w.contains("what the described braid makes"))
     };
-    assert!(told(1.0 / 9.806_65) && !told(1.0));
+    assert!(warns(1.0 / 9.806_65) && !warns(1.0));
 }
 
 #[test]

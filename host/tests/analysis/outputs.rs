@@ -18,7 +18,7 @@ fn run(folder: &Path, script: &str) -> Output {
         .unwrap()
 }
 
-fn told(output: &Output) -> String {
+fn messages(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -47,7 +47,7 @@ fn a_pipe_is_hashed_as_it_is_read_and_the_command_ends() {
              pipe $(ls *.csv | grep -v {name}) -o out.pam"
         ),
     );
-    assert!(output.status.success(), "{:?} {}", output.status, told(&output));
+    assert!(output.status.success(), "{:?} {}", output.status, messages(&output));
     let table = TableFile::read(folder.path().join("out.pam")).unwrap();
     let source = table.about.sources.iter().find(|s| s.path == "pipe").unwrap();
     assert_eq!(source.sha256, sha256(&first).unwrap());
@@ -68,11 +68,11 @@ fn a_result_that_cannot_be_printed_is_a_failure_unless_its_reader_left() {
         "\"$HOST\" completions bash > /dev/full",
     ] {
         let output = run(folder.path(), command);
-        assert_eq!(output.status.code(), Some(1), "{command}: {}", told(&output));
-        assert!(told(&output).contains("standard output"), "{command}: {}", told(&output));
+        assert_eq!(output.status.code(), Some(1), "{command}: {}", messages(&output));
+        assert!(messages(&output).contains("standard output"), "{command}: {}", messages(&output));
     }
     let output = run(folder.path(), "\"$HOST\" fit --muscle muscle.toml *.csv --json - | head -c 10");
-    assert!(output.status.success(), "{}", told(&output));
+    assert!(output.status.success(), "{}", messages(&output));
 }
 
 #[test]
@@ -84,6 +84,6 @@ fn a_device_that_never_ends_is_refused_within_bounded_memory() {
     {
         campaign(folder.path());
         let output = run(folder.path(), &format!("ulimit -v 3000000; timeout 300 \"$HOST\" {command}"));
-        assert_eq!(output.status.code(), Some(1), "{command}: {}", told(&output));
+        assert_eq!(output.status.code(), Some(1), "{command}: {}", messages(&output));
     }
 }

@@ -80,12 +80,12 @@ fn the_pressure_alone_tells_filling_from_emptying() {
             return;
         };
         for mut recording in campaign.recordings {
-            let told = recording.direction.take().unwrap();
+            let commanded = recording.direction.take().unwrap();
             let found = Motion::of(&recording).direction;
-            let wrong: Vec<usize> = (0..told.len()).filter(|i| told[*i] != found[*i]).collect();
+            let wrong: Vec<usize> = (0..commanded.len()).filter(|i| commanded[*i] != found[*i]).collect();
             // The file contains the valve's command. At the top the command to empty comes up to one period before the pressure
             // falls, and it is the pressure that the muscle feels.
-            let top = told.iter().position(|d| *d < 0).unwrap();
+            let top = commanded.iter().position(|d| *d < 0).unwrap();
             assert!(
                 wrong.iter().all(|i| *i == top || *i + 1 == top),
                 "{}: {wrong:?}, top {top}",
@@ -122,7 +122,7 @@ fn staircases_come_in_with_the_list_of_their_runs() {
 }
 
 #[test]
-fn a_muscle_that_is_not_in_the_file_is_told() {
+fn a_muscle_that_is_not_in_the_file_is_reported() {
     let path = project().join("../shared/data/aarl-festo-10mm-2022/settled_points.csv");
     if !path.exists() {
         eprintln!("skipped: {} is not here", path.display());

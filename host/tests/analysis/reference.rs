@@ -174,7 +174,7 @@ fn bad_references_are_refused_with_the_cause() {
 }
 
 #[test]
-fn overlapping_parts_of_one_recording_are_refused_and_the_wrong_order_is_told() {
+fn overlapping_parts_of_one_recording_are_refused_and_the_wrong_order_is_reported() {
     let bench = Bench::new();
     let whole = bench.runs("whole", None, same);
     let text = std::fs::read_to_string(&whole[0]).unwrap();

@@ -29,7 +29,7 @@ fn gain(subject: &Subject, law: Law, hz: f64) -> f64 {
     let settings = subject.settings(law, Load::AtStroke);
     let mut control =
         Loop::start(&bench, &subject.motion(Load::AtStroke), &subject.table, settings, Mode::Force);
-    let (mean, _) = subject.wish(Mode::Force);
+    let (mean, _) = subject.setpoint_range(Mode::Force);
     let amplitude = AMPLITUDE * subject.blocked();
     control.point(SetPoint::Force(mean));
     control.run(1_000);

@@ -1,7 +1,7 @@
 //! Two muscles on one pulley: the benches of a board that drives a pair.
 //!
 //! `I θ'' = r (F₁ − F₂) − c θ' − τ`, strokes `x_rest ± r θ`. The board asks the first bench and then the second each tick; the
-//! joint moves when both have been told their pressure.
+//! joint moves when both have received their pressure.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

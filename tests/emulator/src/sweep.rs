@@ -228,7 +228,7 @@ impl Subject {
     }
 
     /// Mean and amplitude of the setpoint, N or m.
-    pub(crate) fn wish(&self, mode: Mode) -> (f32, f32) {
+    pub(crate) fn setpoint_range(&self, mode: Mode) -> (f32, f32) {
         match mode {
             Mode::Stroke => (0.2 * self.free_stroke() as f32, 0.1 * self.free_stroke() as f32),
             _ => (0.4 * self.blocked() as f32, 0.1 * self.blocked() as f32),
@@ -249,7 +249,7 @@ impl Subject {
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let settings = self.settings(law, load);
         let mut control = Loop::start(&bench, &self.motion(load), &self.table, settings, mode);
-        let (mean, amplitude) = self.wish(mode);
+        let (mean, amplitude) = self.setpoint_range(mode);
         control.point(point(mode, mean));
         control.run(1_500);
         control.wave(course.reference(mean, amplitude));
@@ -263,7 +263,7 @@ impl Subject {
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let mut control =
             Loop::start(&bench, &self.motion(load), &self.table, self.settings(law, load), Mode::Force);
-        let (mean, amplitude) = self.wish(Mode::Force);
+        let (mean, amplitude) = self.setpoint_range(Mode::Force);
         control.point(SetPoint::Force(mean + amplitude));
         control.run(1_000);
         control.point(SetPoint::Force(mean));
@@ -286,7 +286,7 @@ impl Subject {
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let settings = self.settings(law, load);
         let mut control = Loop::start(&bench, &self.motion(load), &self.table, settings, Mode::Force);
-        let (mean, amplitude) = self.wish(Mode::Force);
+        let (mean, amplitude) = self.setpoint_range(Mode::Force);
         control.point(SetPoint::Force(mean));
         control.run(1_500);
         let mut ticks = Vec::new();
@@ -356,7 +356,7 @@ pub fn in_qemu(subject: &Subject, mode: Mode, load: Load, course: Course, law: L
     let mut client = machine.client();
     upload(&mut client, Side::Agonist, &subject.table);
     tracking::set(&mut client, |settings| *settings = subject.settings(law, load));
-    let (mean, amplitude) = subject.wish(mode);
+    let (mean, amplitude) = subject.setpoint_range(mode);
     let ticks = u64::from(course.ticks()) / 2;
     let stretches = [
         Stretch { wanted: Wanted::Point(point(mode, mean)), ticks: 1_000, unjudged: 1_000 },

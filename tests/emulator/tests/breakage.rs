@@ -172,8 +172,8 @@ fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_it
             client.set_point(SetPoint::Pressure(pascals)).expect("a set-point");
         }
         let report = tracking::stopped(&mut client);
-        let told = station.periods();
-        station.until(name, |now| now > told + 5);
+        let before = station.periods();
+        station.until(name, |now| now > before + 5);
         let after = station.since(broken);
         // Blocked air shows only after a change of the command; on a busy machine this change comes late.
         let changed = after.iter().position(|exchange| (exchange.command - 250e3).abs() > 50e3);
@@ -184,7 +184,7 @@ fn a_burst_a_leak_a_closed_supply_and_a_jammed_valve_are_noticed_on_the_plant_it
         // 200 ticks of `follow_ticks`, and the time in which air and model part.
         assert!(vented.is_some_and(|n| (200..400).contains(&n)), "{name}: vents after {vented:?} ticks");
         station.with(|bench| *bench.plant().pneumatics() = whole);
-        station.until(name, |now| now > told + 300);
+        station.until(name, |now| now > before + 300);
         client.call::<ClearFault>(&()).expect("it clears when the air is whole");
     }
 }

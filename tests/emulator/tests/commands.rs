@@ -292,12 +292,12 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     let arguments = ["device", "log", "--seconds", "120", "--json", "--elf", &elf];
     let mut log = program::start_piped(&stand.line, stand.folder.path(), &arguments);
     let mut lines = BufReader::new(log.stdout.take().expect("its output")).lines();
-    let mut told = Vec::new();
+    let mut events = Vec::new();
     // Everything up to a line that is waited for; the program ends after its two minutes where that never comes.
     let mut until = |so: &dyn Fn(&Value) -> bool| {
-        while !told.iter().any(so) {
-            let line = lines.next().unwrap_or_else(|| panic!("it ends before that, after {told:?}"));
-            told.push(json(&line.expect("a line")));
+        while !events.iter().any(so) {
+            let line = lines.next().unwrap_or_else(|| panic!("it ends before that, after {events:?}"));
+            events.push(json(&line.expect("a line")));
         }
     };
     until(&|line| line["event"] == "state" && line["state"] == "armed");
@@ -311,9 +311,9 @@ fn the_log_of_the_image_is_decoded_beside_events() {
     });
     // Events and log lines are of one clock.
     let time =
-        |kind: &str| told.iter().find(|line| line["event"] == kind).map(|line| number(&line["time_s"]));
+        |kind: &str| events.iter().find(|line| line["event"] == kind).map(|line| number(&line["time_s"]));
     let apart = time("log").zip(time("fault")).map(|(log, fault)| (log - fault).abs());
-    assert!(time("fault").is_some_and(|at| at > 0.0) && apart.is_some_and(|s| s < 1e-6), "{told:?}");
+    assert!(time("fault").is_some_and(|at| at > 0.0) && apart.is_some_and(|s| s < 1e-6), "{events:?}");
     program::interrupt(&log);
     let status = log.wait().expect("it ends");
     assert!(status.success(), "ended by the key for it: {status:?}");

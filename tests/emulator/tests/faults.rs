@@ -238,7 +238,7 @@ fn a_mode_without_its_table_is_a_fault_and_nothing_starts_by_itself() {
 }
 
 #[test]
-fn a_calculation_that_fails_vents_and_is_told_with_its_result() {
+fn a_calculation_that_fails_vents_and_is_reported_with_its_result() {
     let folder = Folder::new();
     let station = station();
     let Some(machine) = board(&folder, &station) else { return };

@@ -22,7 +22,7 @@ use model_core::link::frame::{Header, Kind, MAX_WIRE, encode};
 use model_core::link::messages::{Mode, SetPoint, Side, Start, State, TelemetryRate};
 use pam_device::error::DeviceCode;
 use pam_device::run::{arm, vent};
-use pam_device::slcan::{Heard, Parser, transmit};
+use pam_device::slcan::{Parser, Received, transmit};
 use pam_device::{Address, Client, Port, Topic, tables};
 
 /// What an adapter does wrong.
@@ -124,7 +124,7 @@ impl Adapter {
             }
             (_, [b't', ..]) => {
                 let mut said = line.iter().chain(b"\r").filter_map(|byte| self.parser.push(*byte));
-                let Some(Heard::Message(identifier, data)) = said.next() else {
+                let Some(Received::Message(identifier, data)) = said.next() else {
                     panic!("a message: {line:?}")
                 };
                 drop(said);
@@ -293,20 +293,20 @@ fn each_address_is_a_controller_and_one_command_vents_all() {
 }
 
 #[test]
-fn an_address_where_nobody_is_and_an_adapter_that_refuses_are_told_in_words() {
-    let told = |bus: &Bus, device: &str| Client::open(&bus.address(device)).expect_err("nobody answers");
+fn an_address_where_nobody_is_and_an_adapter_that_refuses_are_reported_in_words() {
+    let error_of = |bus: &Bus, device: &str| Client::open(&bus.address(device)).expect_err("nobody answers");
     let bus = Bus::new(1, Vice::None);
-    let error = told(&bus, "3");
+    let error = error_of(&bus, "3");
     assert_eq!(error.code(), DeviceCode::DeviceSilent);
     assert!(error.cause().contains("this address of the CAN bus"), "{error}");
     assert!(error.advice().is_some_and(|help| help.contains("can.address")));
-    let error = told(&Bus::new(1, Vice::RefusesMessages), "1");
+    let error = error_of(&Bus::new(1, Vice::RefusesMessages), "1");
     assert_eq!(error.code(), DeviceCode::DeviceSilent);
     assert!(error.cause().contains("the CAN adapter refuses"), "{error}");
-    let error = told(&Bus::new(1, Vice::RefusesTheRate), "1");
+    let error = error_of(&Bus::new(1, Vice::RefusesTheRate), "1");
     assert_eq!(error.code(), DeviceCode::DevicePort);
     assert!(error.cause().contains("refuses 500 kbit/s"), "{error}");
-    let error = told(&Bus::new(1, Vice::Login), "1");
+    let error = error_of(&Bus::new(1, Vice::Login), "1");
     assert_eq!(error.code(), DeviceCode::DeviceForeign);
     assert!(error.cause().contains("not a CAN adapter"), "{error}");
     let error =

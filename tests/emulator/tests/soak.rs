@@ -208,12 +208,12 @@ fn round(number: u32, fault: Fault, rig: &mut Rig, row: &mut Row) -> bool {
     assert_eq!(ended.success(), succeeds, "{fault:?}: {}", said(&mut run));
     let path = rig.folder().join(&name);
     let whole = path.exists();
-    let Recorded { samples, missing, told } = if whole { recorded(&path) } else { rig.recovered(&name) };
+    let Recorded { samples, missing, reported } = if whole { recorded(&path) } else { rig.recovered(&name) };
     assert!(samples > 300, "{fault:?}: {samples} samples");
     // A recording that was cut off has no report of the line; its ticks show what is missing.
     // A full disk may end it before a row that was counted.
-    let right = if fault == Fault::FullDisk { missing <= told } else { missing == told };
-    assert!(!whole || right, "{fault:?}: {missing} samples are missing, the recording reports {told}");
+    let right = if fault == Fault::FullDisk { missing <= reported } else { missing == reported };
+    assert!(!whole || right, "{fault:?}: {missing} samples are missing, the recording reports {reported}");
     row.add(ticks, samples, missing);
     // The recorder ends with the cable, and where it stood still for long: the next one begins.
     rig.revive();
@@ -236,7 +236,7 @@ fn number(variable: &str) -> Option<u64> {
 }
 
 #[test]
-fn every_fault_ends_vented_no_sample_is_missing_untold_and_nothing_leaks() {
+fn every_fault_ends_vented_no_sample_is_missing_unreported_and_nothing_leaks() {
     let long = std::env::var_os("PAM_LONG").is_some();
     let seconds = number("PAM_SOAK_SECONDS").unwrap_or(if long { 3_600 } else { 45 });
     let seed = number("PAM_SOAK_SEED").unwrap_or(1);

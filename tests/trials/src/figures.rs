@@ -149,7 +149,7 @@ impl Figures {
             .filter_map(|s| s.1)
             .collect();
         let median = |of: &dyn Fn(&HeldOut) -> Option<f64>| Median::of(held.iter().filter_map(of).collect());
-        let told = held.iter().filter(|h| h.oracle.is_some()).count();
+        let with_oracle = held.iter().filter(|h| h.oracle.is_some()).count();
         let with_tables: Vec<&&Scored> = all.iter().filter(|s| s.1.is_some()).collect();
         let harmed = with_tables.iter().filter(|s| s.1.is_some_and(|h| h.harmed())).count();
         let intervals: Vec<&Interval> = it().flat_map(|o| &o.intervals).collect();
@@ -209,7 +209,10 @@ impl Figures {
             gain: median(&|h| h.gain()),
             gain_against_twin: median(&|h| h.gain_against_twin()),
             oracle_against_twin: median(&|h| h.oracle_against_twin()),
-            oracle_idle: Rate::new(told - held.iter().filter(|h| h.gain().is_some()).count(), told),
+            oracle_idle: Rate::new(
+                with_oracle - held.iter().filter(|h| h.gain().is_some()).count(),
+                with_oracle,
+            ),
             harmed: Rate::new(harmed, with_tables.len()),
         }
     }

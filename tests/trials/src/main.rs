@@ -1,12 +1,11 @@
 //! `trials`: makes sealed trials, has the tool answer them, opens the seals and scores the answers.
 
-mod again;
 mod answer;
 mod baselines;
+mod binomial_interval;
 #[cfg(test)]
 mod book;
 mod campaign;
-mod clopper;
 mod festo;
 mod festo_history;
 mod festo_tables;
@@ -32,6 +31,7 @@ mod report;
 mod residuals;
 mod score;
 mod scoring;
+mod second_round;
 mod selective_risk;
 mod semi;
 mod sensitivity;
@@ -269,7 +269,7 @@ fn main() -> ExitCode {
         Command::Again { set, host, data, minutes } => {
             let draw = |seed, set: &str, n| spec::draw(seed, set, spec::Composition::of(set, n));
             let until = minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
-            again::run(&set, &host, &residuals::Residuals::read(&data), until, draw)
+            second_round::run(&set, &host, &residuals::Residuals::read(&data), until, draw)
         }
         Command::Semi(real) => {
             semi::run(&real.data, &real.output, &real.host).and_then(|()| real.copy_to_book("semi.md"))

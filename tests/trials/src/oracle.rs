@@ -44,13 +44,13 @@ pub fn ask(set: &Path, how: &Asking) -> Result<bool, Box<dyn Error>> {
             open.push(truth);
         }
     }
-    let progress = Progress::new("told the truth", open.len());
+    let progress = Progress::new("given the true effects", open.len());
     in_order(&open, |truth: &TrialTruth| {
         if how.until.is_none_or(|t| Instant::now() <= t) {
-            let told = Oracle {
+            let answer = Oracle {
                 error: tell(set, how, truth).map_err(|e| eprintln!("trial {}: {e}", truth.id)).ok(),
             };
-            let text = serde_json::to_string(&told).map_err(|e| e.to_string())?;
+            let text = serde_json::to_string(&answer).map_err(|e| e.to_string())?;
             std::fs::write(work(set, truth.id)?.join("oracle.json"), text).map_err(|e| e.to_string())?;
         }
         progress.one();

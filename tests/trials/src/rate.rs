@@ -1,6 +1,6 @@
 //! Success rates with exact confidence intervals, and medians.
 
-use crate::clopper::interval;
+use crate::binomial_interval::interval;
 use crate::score::Outcome;
 use serde::Serialize;
 

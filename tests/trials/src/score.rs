@@ -184,8 +184,8 @@ fn concealed(truth: &TrialTruth, a: &Answer, set: &[String]) -> Option<Concealed
     let proposed = in_set && a.next_experiment.as_ref().is_some_and(|n| !n.is_null());
     let checked = entry.is_some_and(|c| c.checked);
     let measures = ["weigh", "photo", "gauge", "tare", "calliper", "dead weight", "vented", "held lengths"];
-    let told = entry.is_some_and(|c| measures.iter().any(|m| c.why_not.contains(m)));
-    Some(Concealed { admitted, advised: admitted && (named || checked || proposed || told) })
+    let measure_named = entry.is_some_and(|c| measures.iter().any(|m| c.why_not.contains(m)));
+    Some(Concealed { admitted, advised: admitted && (named || checked || proposed || measure_named) })
 }
 
 /// Effects whose parameter means the same on both sides.

@@ -1,7 +1,7 @@
 //! Opening the seals: the score of every answer, and the report.
 
 use crate::figures::{Figures, Scored};
-use crate::{again, answer, baselines, fitted, ledger, locate, report, score};
+use crate::{answer, baselines, fitted, ledger, locate, report, score, second_round};
 use rayon::prelude::*;
 use std::error::Error;
 use std::path::Path;
@@ -50,9 +50,9 @@ pub fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<Scored>, Box
         );
         text.insert_str(at, &line);
     }
-    if let Some(second) = again::read(set) {
+    if let Some(second) = second_round::read(set) {
         let at = text.find("\n## Every failure").unwrap_or(text.len());
-        text.insert_str(at, &again::markdown(&second));
+        text.insert_str(at, &second_round::markdown(&second));
     }
     std::fs::write(set.join("report.md"), &text)?;
     let every: Vec<&Scored> = scored.iter().collect();

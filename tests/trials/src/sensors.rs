@@ -1,7 +1,7 @@
 //! Spoiled files: sensors that freeze, saturate, die or drop out, wrong units, signs and zeros, put into one recording of a clean
 //! campaign of the virtual bench. Asked: is the recording found, and only that one?
 
-use crate::clopper::interval;
+use crate::binomial_interval::interval;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::sensor_faults::Channel;
 use pam_data::recording::{Campaign, Recording};

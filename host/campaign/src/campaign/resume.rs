@@ -45,7 +45,7 @@ pub(super) fn resume(
                     rows: *rows,
                     clock_s: (*begin_s, *end_s),
                     spoiled: std::mem::take(&mut spoiled),
-                    told: String::new(),
+                    finding: String::new(),
                 });
             }
             Event::Checked { check, file, end_s, .. } => {
@@ -60,12 +60,12 @@ pub(super) fn resume(
                     rows: 0,
                     clock_s,
                     spoiled,
-                    told: String::new(),
+                    finding: String::new(),
                 });
             }
-            Event::Told { words, .. } => {
+            Event::Finding { words, .. } => {
                 if let Some(last) = course.last_mut() {
-                    last.told.clone_from(words);
+                    last.finding.clone_from(words);
                 }
             }
             Event::Begin { .. } | Event::Ended { .. } => {}

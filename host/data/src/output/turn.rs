@@ -162,7 +162,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_program_that_is_stopped_is_told_from_one_that_runs() {
+    fn a_program_that_is_stopped_is_distinguished_from_one_that_runs() {
         let mut stopped =
             std::process::Command::new("sh").args(["-c", "kill -STOP $$"]).spawn().expect("a program");
         let deadline = Instant::now() + Duration::from_secs(60);

@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_that_is_given_twice_is_told() {
+    fn a_recording_that_is_given_twice_is_reported() {
         let warned = |recordings| Campaign::new(recordings).warnings.join("; ");
         assert_eq!(warned(vec![from("a", 0.0, 60.0), from("b", 0.0, 50.0)]), "");
         let twice = warned(vec![from("a", 0.0, 60.0), from("b", 0.0, 50.0), from("a", 0.0, 60.0)]);
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn runs_at_different_lengths_in_one_file_are_reported() {
-        let told = |pause: f64, mm: f64| {
+        let remark = |pause: f64, mm: f64| {
             let row = |i: i32| {
                 (0.1 * f64::from(i) + if i < 50 { 0.0 } else { pause }, if i < 50 { 0.0 } else { 1e-3 * mm })
             };
@@ -260,11 +260,11 @@ mod tests {
             Campaign::new(vec![recording]).warnings.join("; ")
         };
         assert!(
-            told(30.0, 7.5)
+            remark(30.0, 7.5)
                 .starts_with("the clock of `a` pauses for 30 s at 4.90 s, and the length changes by 7.50 mm")
         );
         // Lost rows during a motion, and a pause at one length, are no runs.
-        assert_eq!((told(1.0, 7.5), told(30.0, 0.0)), (String::new(), String::new()));
+        assert_eq!((remark(1.0, 7.5), remark(30.0, 0.0)), (String::new(), String::new()));
     }
 
     #[test]
@@ -275,21 +275,21 @@ mod tests {
             stroke: (0..100).map(|i| way * f64::from(i % 20)).collect(),
             ..Recording::default()
         };
-        let told = |interval: f64, way: f64| {
+        let remark = |interval: f64, way: f64| {
             let files = [("a", 0.0, 0.1, 1e-4), ("b", 20.0, interval, way), ("c", 1e6, 0.1, 1e-4)];
             Campaign::new(files.map(|(n, s, i, w)| loops(n, s, i, w)).to_vec()).warnings.join("; ")
         };
-        let said = told(100.0, 1e-4);
+        let said = remark(100.0, 1e-4);
         assert!(said.contains("`b` is 100.0000 s, that of the others 0.1000 s"), "{said}");
-        assert!(told(1e-4, 1e-4).contains("another unit"));
+        assert!(remark(1e-4, 1e-4).contains("another unit"));
         // A logger that was set to another rate sees the same motion.
-        assert_eq!(told(1e-4, 1e-7), "");
-        assert_eq!(told(0.1, 1e-4), "");
-        assert_eq!(told(10.0, 1e-4), "");
+        assert_eq!(remark(1e-4, 1e-7), "");
+        assert_eq!(remark(0.1, 1e-4), "");
+        assert_eq!(remark(10.0, 1e-4), "");
     }
 
     #[test]
-    fn overlap_far_from_zero_is_told() {
+    fn overlap_far_from_zero_is_reported() {
         let campaign = Campaign::new(vec![from("a", 500.0, 600.0), from("b", 550.0, 650.0)]);
         assert_eq!(campaign.clock, Clock::Separate);
         assert_eq!(campaign.warnings.len(), 1);

@@ -129,22 +129,17 @@ fn in_si(column: &Column, scale: f64, offset: f64, keep: Option<&[bool]>) -> Res
                 .value(value.to_string())
                 .help("leave such rows out by --missing skip (missing = \"skip\" in an import description)")),
         },
-        Column::Texts(texts) => Err(Error::new(
-            DataCode::RecordingNotANumber,
-            "a column of text where numbers are needed",
-        )
-        .value(texts.first().map_or("", String::as_str))
-        .help("save the column as numbers")),
+        Column::Texts(texts) => {
+            Err(Error::new(DataCode::RecordingNotANumber, "a column of text where numbers are needed")
+                .value(texts.first().map_or("", String::as_str))
+                .help("save the column as numbers"))
+        }
         Column::Other(_) => Ok(Vec::new()),
     }
 }
 
 /// Times of time stamps.
-fn times(
-    column: &Column,
-    seconds: impl Fn(&str) -> Option<f64>,
-    keep: Option<&[bool]>,
-) -> Result<Vec<f64>> {
+fn times(column: &Column, seconds: impl Fn(&str) -> Option<f64>, keep: Option<&[bool]>) -> Result<Vec<f64>> {
     match column {
         Column::Texts(texts) => kept(texts, keep)
             .map(|(row, text)| {
@@ -156,12 +151,11 @@ fn times(
                 })
             })
             .collect(),
-        Column::Numbers(values) => Err(Error::new(
-            DataCode::RecordingNotANumber,
-            "a column of numbers where time stamps are needed",
-        )
-        .value(values.first().map_or(String::new(), f64::to_string))
-        .help("give the unit of the numbers in the import description: s or ms")),
+        Column::Numbers(values) => {
+            Err(Error::new(DataCode::RecordingNotANumber, "a column of numbers where time stamps are needed")
+                .value(values.first().map_or(String::new(), f64::to_string))
+                .help("give the unit of the numbers in the import description: s or ms"))
+        }
         Column::Other(_) => Ok(Vec::new()),
     }
 }

@@ -77,7 +77,7 @@ impl Container {
                 .help("`mcap convert FILE.bag FILE.mcap` writes it as MCAP, which is read")),
             Self::Sqlite => Err(Error::new(DataCode::RecordingContainer, "the file is a database of SQLite")
                 .help("if it is a bag of ROS 2, `mcap convert FILE.db3 FILE.mcap` or `ros2 bag convert` writes it as MCAP, which is read")),
-            Self::Hdf5 | Self::Parquet if !source.again => Err(Error::new(
+            Self::Hdf5 | Self::Parquet if !source.rereadable => Err(Error::new(
                 DataCode::FileUnreadable,
                 format!("a {} file cannot be read from a pipe", self.name()),
             )

@@ -133,7 +133,7 @@ impl<'a> FirstLine<'a> {
         })
     }
 
-    /// The names of so many columns that some programs write as a remark above the numbers.
+    /// The names that some programs write as a remark above the numbers, where there is one for each column.
     fn names_in_remark(&self, columns: usize, dialect: Dialect) -> Result<Vec<String>> {
         let names = self.split(self.remark.trim_ascii(), dialect)?;
         if names.len() == columns && names.iter().any(|n| named(n) != Named::Other) {

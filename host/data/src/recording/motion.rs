@@ -37,7 +37,7 @@ use super::columns::Recording;
 use crate::criteria::Stage;
 use crate::statistics::quantile;
 use criteria::{LEVEL_SAMPLES, MOTION_STROKE_FLOOR, MOTION_STROKE_SHARE, RANGE_TRIM};
-use reversals::{stroke_turns, told_turns, with_pressure};
+use reversals::{stated_turns, stroke_turns, with_pressure};
 use turning::{Track, legs};
 
 #[cfg(test)]
@@ -54,7 +54,7 @@ pub enum Cause {
     /// Its length was held and the pressure changed.
     Pressure,
     /// The recording itself says so.
-    Told,
+    Stated,
 }
 
 /// A change of direction.
@@ -122,7 +122,7 @@ impl Motion {
         let mut turns = stroke_turns(&track, &legs, &holds);
         drop(smooth);
         match &recording.direction {
-            Some(told) => turns = told_turns(told),
+            Some(directions) => turns = stated_turns(directions),
             None => {
                 let track = Track {
                     time,

@@ -50,7 +50,7 @@ pub struct Reader<'a> {
     pub sheet: Option<String>,
     /// Files with fewer rows are refused.
     pub min_rows: usize,
-    /// Told of every byte that is read.
+    /// Receives every byte that is read.
     pub progress: Option<Arc<dyn Progress>>,
     /// Takes the SHA-256 of every file that is read.
     pub hashes: Option<Arc<Hashes>>,
@@ -371,7 +371,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have told other things.
+/// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have written other things.
 fn header_below(text: &[u8], header: &Header) -> Option<u64> {
     let names = |line: &[u8]| {
         let line = String::from_utf8_lossy(line);

@@ -25,7 +25,7 @@ pub(super) struct Source {
     /// The first bytes of the file itself, before any decompression.
     pub magic: Vec<u8>,
     /// Whether it can be opened again: a pipe gives its bytes once.
-    pub again: bool,
+    pub rereadable: bool,
     pub bytes: Bytes,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bo
         progress: progress.cloned(),
     };
     let bytes = Bytes(Arc::new(Mutex::new(counted)));
-    let (whole, again) = (bytes.clone(), meta.is_file());
+    let (whole, rereadable) = (bytes.clone(), meta.is_file());
     let mut size = None;
     let reader: Box<dyn Read + Send> = if magic.starts_with(&GZIP) {
         Box::new(flate2::read::MultiGzDecoder::new(whole))
@@ -59,10 +59,10 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bo
         io::copy(&mut whole.clone().take(2), &mut io::sink()).map_err(unreadable)?;
         Box::new(Utf16::new(Box::new(whole), magic.starts_with(&UTF_16_BIG)))
     } else {
-        size = again.then_some(meta.len());
+        size = rereadable.then_some(meta.len());
         Box::new(whole)
     };
-    Ok(Source { reader, size, magic, again, bytes })
+    Ok(Source { reader, size, magic, rereadable, bytes })
 }
 
 /// A file that counts and hashes the bytes that are read.

@@ -137,7 +137,7 @@ mod tests {
         };
         let mut search = Search::new(175e3, gain);
         let (mut command, mut held, mut p, mut time) = (175e3_f64, 175e3, gain * 175e3, 0.0);
-        let mut asked = command;
+        let mut next_command = command;
         while search.found().is_none() && time < 120.0 {
             let bunch: Vec<(f64, f64, f64)> = (0..late)
                 .map(|_| {
@@ -152,9 +152,9 @@ mod tests {
                 .collect();
             for (time, command, p) in bunch {
                 search.take(command, p);
-                asked = search.next(time).unwrap_or(asked);
+                next_command = search.next(time).unwrap_or(next_command);
             }
-            command = asked;
+            command = next_command;
         }
         (search.found().expect("within a minute"), time)
     }

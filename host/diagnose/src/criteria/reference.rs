@@ -224,7 +224,7 @@ pam_data::criteria! {
     GATE_WORTH_ASKING: f64 = -1.0, "gate_worth_asking", "1", Judgement;
     /// A part of the cells is reported where it holds this much more of the energy than of the cells.
     LOCALISE_STANDS_OUT: f64 = 1.2, "localise_stands_out", "1", Judgement;
-    /// Below this share of the usual slope the elastic part is not told from slack.
+    /// Below this share of the usual slope the elastic part is not distinguished from slack.
     REPEATABILITY_PULLS: f64 = 0.05, "repeatability_pulls", "1", Judgement;
     /// Share of the largest pressure within which a regulated one stays.
     REPORT_REGULATED: f64 = 0.3, "report_regulated", "1", Judgement;

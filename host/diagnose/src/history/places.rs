@@ -34,9 +34,10 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
         .collect();
     let p_first = chance(points, &energy, true, share(&first) * all, |e| first.iter().map(|r| e[*r]).sum());
     let rows = |runs: &[usize]| count(runs) / points.len() as f64;
-    let told = |runs: &[usize], p: f64| share(runs) >= PLACES_CONCENTRATED * rows(runs) && p <= PLACES_SURE;
+    let is_concentrated =
+        |runs: &[usize], p: f64| share(runs) >= PLACES_CONCENTRATED * rows(runs) && p <= PLACES_SURE;
     let mut found = Vec::new();
-    if told(&first, p_first) {
+    if is_concentrated(&first, p_first) {
         let (share, rows) = (share(&first), rows(&first));
         let region = |coordinate: &str, from: f64, to: f64, unit: &str| Region {
             coordinate: coordinate.into(),
@@ -62,7 +63,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
             sums.fold(0.0, f64::max)
         };
         let p = chance(points, &energy, false, share(runs) * all, largest);
-        if told(runs, p) {
+        if is_concentrated(runs, p) {
             let number = (m + 1) as f64;
             let (share, rows) = (share(runs), rows(runs));
             found.push(Region {

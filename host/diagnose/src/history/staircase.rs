@@ -31,10 +31,10 @@ pub(super) struct Point {
 
 /// The settled points of a recording, and whether rows were averaged into them.
 pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool) {
-    let told = recording.direction.as_deref().filter(|d| d.iter().any(|d| *d != 0));
-    let directions = told.map_or_else(|| vec![0; recording.len()], held_directions);
+    let stated = recording.direction.as_deref().filter(|d| d.iter().any(|d| *d != 0));
+    let directions = stated.map_or_else(|| vec![0; recording.len()], held_directions);
     let (mut points, averaged) = averages(recording, force, &directions);
-    if told.is_none() {
+    if stated.is_none() {
         turns(&mut points);
     }
     (points, averaged)
@@ -140,9 +140,10 @@ impl PressureHistory {
 }
 
 /// What the bench says of each row; where it says nothing, what it said last.
-fn held_directions(told: &[i8]) -> Vec<i8> {
-    let mut last = told.iter().copied().find(|d| *d != 0).unwrap_or(1);
-    told.iter()
+fn held_directions(stated: &[i8]) -> Vec<i8> {
+    let mut last = stated.iter().copied().find(|d| *d != 0).unwrap_or(1);
+    stated
+        .iter()
         .map(|d| {
             if *d != 0 {
                 last = *d;

@@ -8,7 +8,7 @@ use super::criteria::{GATE, GATE_MOUNTINGS, GATE_WORTH_ASKING};
 use super::shapes::Change;
 
 /// A named change with its evidence over none.
-pub(super) struct Asked<'a> {
+pub(super) struct GatedChange<'a> {
     pub change: Change,
     /// Normalised to unit rms over AFTER.
     pub shape: &'a DVector<f64>,
@@ -19,22 +19,22 @@ pub(super) struct Asked<'a> {
 }
 
 /// Limits the log evidences. With fewer than three mountings there is no limit.
-pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>], sizes: &[f64]) {
+pub(super) fn limit(cells: &[Cell], contrast: &Contrast, changes: &mut [GatedChange<'_>], sizes: &[f64]) {
     let mut mountings: Vec<usize> = cells.iter().filter(|c| c.after).map(|c| c.mounting).collect();
     mountings.sort_unstable();
     mountings.dedup();
-    let candidates: Vec<usize> = (0..asked.len()).filter(|i| asked[*i].log > GATE_WORTH_ASKING).collect();
+    let candidates: Vec<usize> = (0..changes.len()).filter(|i| changes[*i].log > GATE_WORTH_ASKING).collect();
     if mountings.len() < GATE_MOUNTINGS || candidates.is_empty() {
         return;
     }
-    let mut worst = vec![f64::INFINITY; asked.len()];
+    let mut worst = vec![f64::INFINITY; changes.len()];
     for m in mountings {
         let dropped: Vec<usize> =
             (0..cells.len()).filter(|i| cells[*i].after && cells[*i].mounting == m).collect();
         let Some(without) = contrast.without_cells(&dropped) else { continue };
         let scale = without.scale();
         for &i in &candidates {
-            let mut shape = asked[i].shape.clone();
+            let mut shape = changes[i].shape.clone();
             dropped.iter().for_each(|d| shape[*d] = 0.0);
             let (a, b) = without.products(&shape);
             let log = evidence(a, b, scale, sizes);
@@ -46,9 +46,9 @@ pub(super) fn limit(cells: &[Cell], contrast: &Contrast, asked: &mut [Asked<'_>]
     for &i in &candidates {
         // The gate tests the presence of a change of this kind: it closes for every name or for none. Only what begins within AFTER
         // may lie at its end, where one mounting shows it.
-        let closed = best < strong || (asked[i].begins && worst[i] < strong);
+        let closed = best < strong || (changes[i].begins && worst[i] < strong);
         if closed {
-            asked[i].log = asked[i].log.min(worst[i]);
+            changes[i].log = changes[i].log.min(worst[i]);
         }
     }
 }

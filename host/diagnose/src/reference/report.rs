@@ -341,8 +341,8 @@ pub(super) fn left(verdict: Verdict, unseen: &Unseen, places: &[Place]) -> Left 
         Verdict::Unexplained => 1.0,
         _ => (1.0 - unseen.share()).clamp(0.0, 1.0),
     };
-    let told = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
-    Left { share, place: places.first().filter(|_| told).cloned() }
+    let has_misfit = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    Left { share, place: places.first().filter(|_| has_misfit).cloned() }
 }
 
 #[cfg(test)]

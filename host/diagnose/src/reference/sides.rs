@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_of_a_later_day_is_told() {
+    fn a_reference_of_a_later_day_is_reported() {
         let (march, may) = (recording("2026-03-01.csv", 0, 9), recording("2026-05-01.csv", 9, 18));
         assert!(matches!(order(&may, &march), Some(Remark::ReferenceLater { .. })));
         assert_eq!(order(&march, &may), None);

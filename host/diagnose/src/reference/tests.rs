@@ -131,7 +131,7 @@ fn the_same_recordings_on_both_sides_and_other_units_are_refused() {
 }
 
 #[test]
-fn other_lengths_are_told_and_none_in_common_is_an_error_with_both_lists() {
+fn other_lengths_are_reported_and_none_in_common_is_an_error_with_both_lists() {
     let before = campaign(2, 0..3, &untouched);
     let report =
         compare(&campaign(3, 3..6, &untouched), Against::Recordings(&before), &Options::default()).unwrap();

@@ -6,7 +6,7 @@ use super::cells::{Cell, rms_after};
 use super::contrast::{Contrast, evidence};
 use super::course::{self, Candidate, Course, Kind};
 use super::criteria::SIZES;
-use super::gate::{self, Asked};
+use super::gate::{self, GatedChange};
 use super::lag::{self, Shift};
 use super::posterior::{Cause, Posterior};
 use super::shapes::{CHANGES, Change};
@@ -106,18 +106,19 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
     }
     let units: Vec<DVector<f64>> =
         courses.iter().map(|(_, c)| &c.shape / rms_after(cells, &c.shape)).collect();
-    let mut asked: Vec<Asked<'_>> = courses
+    let mut changes: Vec<GatedChange<'_>> = courses
         .iter()
         .zip(&units)
-        .map(|((change, course), shape)| Asked {
+        .map(|((change, course), shape)| GatedChange {
             change: *change,
             shape,
             log: course.log,
             begins: course.start.at > 0.0,
         })
         .collect();
-    gate::limit(cells, contrast, &mut asked, &sizes);
-    let mut all: Vec<(Cause, f64)> = asked.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
+    gate::limit(cells, contrast, &mut changes, &sizes);
+    let mut all: Vec<(Cause, f64)> =
+        changes.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
     all.push((Cause::None, still));
     let range = by.surface.high - by.surface.low;
     let unknown = unknown::weighed(cells, contrast, range, by.surface.largest);

@@ -67,8 +67,8 @@ impl Table {
                     "0" => 0.0,
                     "1" => 1.0,
                     other => {
-                        let told = format!("line {line}: `{other}` is neither 1 nor 0 for `{ATTACHED}`");
-                        return Err(Error::new(DataCode::CheckInvalid, told).file(file));
+                        let cause = format!("line {line}: `{other}` is neither 1 nor 0 for `{ATTACHED}`");
+                        return Err(Error::new(DataCode::CheckInvalid, cause).file(file));
                     }
                 });
             }

@@ -210,12 +210,12 @@ pub(crate) mod tests {
             direct.misfit += w * r * r;
             direct.weight += w;
         }
-        let told = format!("{:?}", design.layout());
+        let layout = format!("{:?}", design.layout());
         let (pairs, rights) =
             (normal.matrix.a.iter().zip(&direct.matrix.a), normal.right.iter().zip(&direct.right));
         let single = [(&normal.misfit, &direct.misfit), (&normal.weight, &direct.weight)];
         for (a, b) in pairs.chain(rights).chain(single) {
-            assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}, {told}");
+            assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}, {layout}");
         }
     }
 }

@@ -30,9 +30,9 @@ const FEWEST_LENGTHS: usize = 3;
 
 /// The options that open dimensions and lengths, where the recordings were held and no option was given.
 pub(super) fn open(points: &Points, options: &Options) -> Option<Options> {
-    let asked = options.fit_geometry || options.fit_lengths || options.as_described;
+    let requested = options.fit_geometry || options.fit_lengths || options.as_described;
     let held = points.held_lengths();
-    (!asked && held.len() >= FEWEST_LENGTHS).then(|| Options {
+    (!requested && held.len() >= FEWEST_LENGTHS).then(|| Options {
         fit_geometry: true,
         fit_lengths: true,
         ..options.clone()

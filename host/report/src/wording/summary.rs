@@ -182,8 +182,7 @@ fn could_be_hidden(s: &mut String, d: &Diagnosis) {
     let mut moving = Vec::new();
     let mut by_measure: Vec<(&str, Vec<String>)> = Vec::new();
     for c in &d.considered {
-        let unseen = c.hidden_up_to_N.is_none_or(|h| h > 0.02 * d.blocked_force_N);
-        if !unseen || c.checked {
+        if c.checked || !c.could_be_hidden(d.blocked_force_N) {
             continue;
         }
         let size = match c.hidden_up_to_N {

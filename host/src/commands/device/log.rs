@@ -54,14 +54,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let tell = |time_s, kind, text: &str, more| say(console, arguments.json, time_s, kind, text, more);
     let begin = Instant::now();
     let mut last = None;
-    let mut asked = None::<Instant>;
-    let mut untold = 0_u64;
+    let mut state_requested = None::<Instant>;
+    let mut unknown_lines = 0_u64;
     while !stop.load(Ordering::Relaxed) && arguments.seconds.is_none_or(|s| begin.elapsed().as_secs_f64() < s)
     {
         // Events arrive immediately; the query every second also notices a device that is gone.
-        if asked.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
+        if state_requested.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
             let status = client.call::<GetStatus>(&())?;
-            asked = Some(Instant::now());
+            state_requested = Some(Instant::now());
             if last != Some((status.state, status.mode)) {
                 last = Some((status.state, status.mode));
                 let (state, mode) = (messages::state(status.state), messages::mode(status.mode));
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                     tell(None, "remedy", &format!("what to do: {}", fault.remedy), More::default());
                 }
             }
-            Some(Topic::Event(Event::State(_))) => asked = None,
+            Some(Topic::Event(Event::State(_))) => state_requested = None,
             Some(Topic::Event(Event::TraceFull)) => {
                 tell(None, "trace-full", "trace full: host device trace --read", More::default());
             }
@@ -95,14 +95,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                         More { level: Some(line.level.clone()), ..More::default() },
                     );
                 }
-                None => untold += 1,
+                None => unknown_lines += 1,
             },
             Some(Topic::Telemetry(_)) | None => {}
         }
     }
-    if untold > 0 {
+    if unknown_lines > 0 {
         console.note(format!(
-            "the device also sent {untold} log lines; give its image with --elf to have them decoded"
+            "the device also sent {unknown_lines} log lines; give its image with --elf to have them decoded"
         ));
     }
     Ok(())

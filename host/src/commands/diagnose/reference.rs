@@ -15,7 +15,7 @@ use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::recording::{Campaign, Import, Reader};
 use pam_diagnose::reference::correction::{self, Done};
-use pam_diagnose::reference::{Against, ChangeReport, Mounted, Options as Asked, compare};
+use pam_diagnose::reference::{Against, ChangeReport, Mounted, Options as ReferenceOptions, compare};
 use pam_fit::table_file::{self, TableFile};
 use pam_report::wording::change as wording;
 use pam_report::{change_page, document};
@@ -175,7 +175,7 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
         warnings.extend(campaign.warnings.iter().cloned());
     }
     warnings.iter().for_each(|w| console.warning(w));
-    let asked = Asked {
+    let options = ReferenceOptions {
         muscle: muscle.as_ref().map(|m| m.name.clone()),
         rest_length: muscle.as_ref().map(MuscleDescription::rest_length),
         geometry: muscle.as_ref().map(MuscleDescription::geometry),
@@ -190,7 +190,7 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
             Against::Table(table, &path)
         }
     };
-    let report = compare(&after, against, &asked)?;
+    let report = compare(&after, against, &options)?;
     console.detail(format!("compared in {:.3} s", start.elapsed().as_secs_f64()));
     if let Some(path) = &arguments.json {
         write_whole(path, (document::change_json(&report) + "\n").as_bytes())?;
@@ -205,8 +205,8 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     }
     // Last, so that the answer is there where no table can be written.
     if let (Some(output), Some(muscle)) = (&arguments.output, &muscle) {
-        let told = write_table(arguments, output, &report, &before, &after, muscle)?;
-        console.note(told);
+        let note = write_table(arguments, output, &report, &before, &after, muscle)?;
+        console.note(note);
     }
     Ok(())
 }
@@ -240,17 +240,17 @@ fn write_table(
         (_, Before::Recordings(campaign)) => (campaign, &arguments.changed.reference),
         (_, Before::Table(..)) => {
             file.write(output)?;
-            return Ok(told(output, done));
+            return Ok(written(output, done));
         }
     };
     let hashes = files.iter().map(table_file::sha256).collect::<Result<Vec<_>>>()?;
     file.about.date = date::now_utc();
     file.about.sources = table_file::sources(campaign, files, hashes);
     file.write(output)?;
-    Ok(told(output, done))
+    Ok(written(output, done))
 }
 
-fn told(output: &Path, done: Done) -> String {
+fn written(output: &Path, done: Done) -> String {
     let what = match done {
         Done::Unchanged => "the table of before: nothing changed",
         Done::Corrected => {

@@ -42,7 +42,7 @@ pub struct Figures {
 impl Figures {
     pub fn table(&self) -> String {
         let mut text = String::from(
-            "| fault | times | longest time until vented, ms | bound, ms | samples recorded | missing and not told |\n\
+            "| fault | times | longest time until vented, ms | bound, ms | samples recorded | missing and not reported |\n\
              | --- | ---: | ---: | ---: | ---: | ---: |\n",
         );
         for (words, within, row) in &self.rows {
@@ -65,10 +65,10 @@ impl Figures {
         let (_, after) = rest.split_once(end).expect("a mark");
         let [first, last] = self.needs;
         let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-        let Recorded { samples, missing, told } = self.recordings;
+        let Recorded { samples, missing, reported } = self.recordings;
         let body = format!(
             "{begin}\n\n{} s, {} ticks of the controller, seed {}.\n\n{}\n\
-             - The program that recorded all the time: {samples} samples, {missing} missing, {told} of them reported.\n\
+             - The program that recorded all the time: {samples} samples, {missing} missing, {reported} of them reported.\n\
              - Programs that did not read and were dropped by the line: {}.\n\
              - The studio, after five faults and at the end: {:.1} and {:.1} MiB, {} and {} open files, {} and {} threads.\n\n{end}",
             self.seconds,

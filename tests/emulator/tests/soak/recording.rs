@@ -9,7 +9,7 @@ pub struct Recorded {
     /// Ticks between the first and the last sample that have none.
     pub missing: u64,
     /// Samples that its side file, or the program that recovered it, says are lost.
-    pub told: u64,
+    pub reported: u64,
 }
 
 /// Reads a recording at the device's own rate, and the file beside it.
@@ -26,10 +26,10 @@ pub fn recorded(path: &Path) -> Recorded {
     let missing = ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum();
     let mut side = path.as_os_str().to_owned();
     side.push(".json");
-    let told = std::fs::read(side)
+    let reported = std::fs::read(side)
         .ok()
         .and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok())
         .and_then(|about| about["losses"]["samples"].as_u64())
         .unwrap_or(0);
-    Recorded { samples: ticks.len() as u64, missing, told }
+    Recorded { samples: ticks.len() as u64, missing, reported }
 }

@@ -290,11 +290,11 @@ impl Rig {
         recover.args(["recover", &part, "--json"]).current_dir(self.folder.path());
         let output = recover.output().expect("the program starts");
         assert!(output.status.success(), "{part}: {}", String::from_utf8_lossy(&output.stderr));
-        let told: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-        let told = &told["recovered"][0];
-        let recording = told["recording"].as_str().expect("a recording");
+        let reported: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let reported = &reported["recovered"][0];
+        let recording = reported["recording"].as_str().expect("a recording");
         let found = recorded(&self.folder.path().join(recording));
-        Recorded { told: told["samples_lost"].as_u64().unwrap_or(0), ..found }
+        Recorded { reported: reported["samples_lost"].as_u64().unwrap_or(0), ..found }
     }
 
     /// Starts a new recorder where the last one has ended, and connects the page where its line was cut.
@@ -316,11 +316,11 @@ impl Rig {
 
     fn judge(&mut self) {
         let path = self.folder.path().join(format!("watched-{}.csv", self.recorder.number));
-        let Recorded { samples, missing, told } = if path.exists() { recorded(&path) } else { return };
-        assert_eq!(missing, told, "{}: missing samples, and those that it reports", path.display());
+        let Recorded { samples, missing, reported } = if path.exists() { recorded(&path) } else { return };
+        assert_eq!(missing, reported, "{}: missing samples, and those that it reports", path.display());
         self.watched.samples += samples;
         self.watched.missing += missing;
-        self.watched.told += told;
+        self.watched.reported += reported;
     }
 
     /// Forgets the latched fault, once its cause has gone.

@@ -40,7 +40,7 @@ pub struct Trial {
     /// Class of the name right: a zero that grows is a drift, an offset of the stroke that comes is a slip.
     pub right: bool,
     /// Course of the name that is right.
-    pub told: &'static str,
+    pub answer: &'static str,
     /// The moment found and its interval, share of AFTER.
     pub found: Option<[f64; 3]>,
     /// s of AFTER.
@@ -106,7 +106,7 @@ fn ask(
         elapsed += run.time.last().copied().unwrap_or(0.0);
     }
     let named = report.missing.iter().find(|m| right(effect, course, &m.effect));
-    let (told, moment): (&str, Option<&Moment>) = match named.map(|m| &m.since) {
+    let (answer, moment): (&str, Option<&Moment>) = match named.map(|m| &m.since) {
         None => ("no name", None),
         Some(Since::Beginning) => ("beginning", None),
         Some(Since::From(m)) => ("suddenly", Some(m)),
@@ -120,7 +120,7 @@ fn ask(
         course,
         start,
         right: named.is_some(),
-        told,
+        answer,
         found: moment.map(|m| [m.moment, m.low, m.high].map(|t| t / duration)),
         duration,
         recording: moment.is_some_and(|m| m.recording == began),

@@ -107,14 +107,14 @@ fn when(t: &mut String, trials: &[course::Trial]) {
                 Course::Ramp => ("gradually", "gradually"),
             };
             let named: Vec<&course::Trial> = own.iter().copied().filter(|c| c.right).collect();
-            let told: Vec<&course::Trial> = named.iter().copied().filter(|c| c.told == right).collect();
+            let answer: Vec<&course::Trial> = named.iter().copied().filter(|c| c.answer == right).collect();
             let error = |c: &&course::Trial| c.found.map(|f| (f[0] - c.start).abs());
-            let mut errors: Vec<f64> = told.iter().filter_map(error).collect();
-            let inside = rate(&told, |c| c.found.is_some_and(|f| f[1] <= c.start && c.start <= f[2]));
-            let wrong = rate(&named, |c| c.told != right && c.told != "not determined");
+            let mut errors: Vec<f64> = answer.iter().filter_map(error).collect();
+            let inside = rate(&answer, |c| c.found.is_some_and(|f| f[1] <= c.start && c.start <= f[2]));
+            let wrong = rate(&named, |c| c.answer != right && c.answer != "not determined");
             let (recording, inside) = match course {
                 Course::Whole => ("–".into(), "–".into()),
-                _ => (rate(&told, |c| c.recording).to_string(), inside.to_string()),
+                _ => (rate(&answer, |c| c.recording).to_string(), inside.to_string()),
             };
             let mut error = |share: f64| match errors.as_mut_slice() {
                 [] => "–".to_owned(),
@@ -125,7 +125,7 @@ fn when(t: &mut String, trials: &[course::Trial]) {
                 "| {name}, {percent} % | {} | {} | {} | {wrong} | {recording} | {} | {} | {inside} |",
                 own.len(),
                 rate(&own, |c| c.right),
-                rate(&named, |c| c.told == right),
+                rate(&named, |c| c.answer == right),
                 error(0.5),
                 error(0.9)
             );

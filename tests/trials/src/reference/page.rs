@@ -12,7 +12,7 @@ use super::cylinder::Pair;
 use super::injection::EFFECTS;
 use super::staircases::{Half, Muscle, Run};
 use super::{Trial, class};
-use crate::clopper::interval;
+use crate::binomial_interval::interval;
 
 mod texts;
 

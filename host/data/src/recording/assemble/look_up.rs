@@ -26,8 +26,9 @@ pub(super) fn look_up(
         let cell = |line: &[String]| line.get(column.index).cloned().unwrap_or_default();
         match &column.role {
             Role::Quantity(q) | Role::Coded(q, _) => {
-                let value =
-                    |l: &&Vec<String>| value(&cell(l), column).map_err(|e| e.file(&described.file).column(name));
+                let value = |l: &&Vec<String>| {
+                    value(&cell(l), column).map_err(|e| e.file(&described.file).column(name))
+                };
                 table.quantities.insert(*q, lines.iter().map(value).collect::<Result<_>>()?);
             }
             Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),

@@ -72,7 +72,7 @@ fn columns_of_a_matrix_are_taken_by_their_numbers() {
 }
 
 #[test]
-fn what_is_no_recording_is_told_with_the_column_and_the_remedy() {
+fn what_is_no_recording_is_reported_with_the_column_and_the_remedy() {
     let cases = [
         ("dates.parquet", "time_s", "a column of dates where numbers are needed"),
         ("durations.parquet", "time_s", "a column of durations where numbers are needed"),
@@ -85,11 +85,11 @@ fn what_is_no_recording_is_told_with_the_column_and_the_remedy() {
     ];
     for (name, place, cause) in cases.into_iter().filter(|(n, ..)| is_read(n)) {
         let error = read(name).expect_err(name);
-        let told = error.to_string().to_lowercase();
+        let message = error.to_string().to_lowercase();
         let (place, cause) = (place.to_lowercase(), cause.to_lowercase());
-        assert!(told.contains(&cause) && told.contains(&place), "{name}: {told}");
-        assert!(error.advised(), "{name}: {told}");
-        assert_eq!(error.exit_status(), 1, "{name}: {told}");
+        assert!(message.contains(&cause) && message.contains(&place), "{name}: {message}");
+        assert!(error.advised(), "{name}: {message}");
+        assert_eq!(error.exit_status(), 1, "{name}: {message}");
     }
 }
 

@@ -162,7 +162,7 @@ fn a_dead_weight_and_a_recording_without_force_say_nothing() {
 }
 
 #[test]
-fn ratios_of_units_are_told_apart() {
+fn ratios_of_units_are_distinguished() {
     for (factor, said) in [
         (6.9, Some("psi to kPa")),
         (1.0 / 14.5, Some("bar to psi")),

@@ -11,9 +11,9 @@ use crate::recording::Quantity;
 pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
     for column in &sample.columns {
         let Some(quantity) = column.named_for() else { continue };
-        let told = guess.unknown.iter().any(|note| note.is_on_column(&column.header));
+        let is_known = guess.unknown.iter().any(|note| note.is_on_column(&column.header));
         let coded = matches!(quantity, Quantity::Direction | Quantity::Cycle);
-        if column.texts == 0 || coded || told || guess.has(quantity) {
+        if column.texts == 0 || coded || is_known || guess.has(quantity) {
             continue;
         }
         let cell = column.first_text.as_deref().unwrap_or_default();

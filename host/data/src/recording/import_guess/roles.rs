@@ -210,7 +210,7 @@ fn described(
     })
 }
 
-/// The unit of a column with its scale and offset, and what should be checked; as an error, why the column has none that is known.
+/// The unit of a column with its scale and offset, and what the user must check; as an error, why the unit is not known.
 fn unit_of(
     column: &SampleColumn,
     quantity: Quantity,
@@ -377,27 +377,27 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
-    let told =
+    let is_noted =
         |guess: &Guess, quantity: Quantity| guess.unknown.iter().any(|note| note.is_on_quantity(quantity));
-    if !guess.has(Quantity::Time) && !told(guess, Quantity::Time) {
+    if !guess.has(Quantity::Time) && !is_noted(guess, Quantity::Time) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
         guess.unknown.insert(0, text.into());
     }
     let caught = |guess: &Guess, quantity: Quantity| guess.patterns.iter().any(|p| p.quantity == quantity);
     let pressure = Quantity::Pressure;
-    if !guess.has(pressure) && !caught(guess, pressure) && !told(guess, pressure) {
+    if !guess.has(pressure) && !caught(guess, pressure) && !is_noted(guess, pressure) {
         let text = "no column of pressure: where it is constant, write it as pressure_kPa under [constants], or catch it from the \
                     names of the files by file_name = '(?<pressure_kPa>[0-9.]+)'";
         guess.unknown.push(text.into());
     }
     let stroke = [Quantity::Displacement, Quantity::Length, Quantity::Contraction];
-    let told_of_stroke = stroke.iter().any(|q| told(guess, *q));
-    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, *q)) && !told_of_stroke {
+    let stroke_is_noted = stroke.iter().any(|q| is_noted(guess, *q));
+    if !stroke.iter().any(|q| guess.has(*q) || caught(guess, *q)) && !stroke_is_noted {
         let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
                     under [constants], or give the files of all lengths, whose names say it";
         guess.unknown.push(text.into());
     }
-    if !guess.has(Quantity::Force) && !told(guess, Quantity::Force) {
+    if !guess.has(Quantity::Force) && !is_noted(guess, Quantity::Force) {
         guess.unknown.push("no column of force: a fit and a diagnosis need it".into());
     }
     if !sample.whole {

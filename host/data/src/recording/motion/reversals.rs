@@ -48,7 +48,7 @@ pub(super) fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) 
     for hold in holds {
         let part = &air.raw[hold.start..=hold.end];
         let legs = legs(part, air.threshold);
-        let mut told = false;
+        let mut has_turned = false;
         for leg in &legs {
             let leg = Leg { start: leg.start + hold.start, end: leg.end + hold.start, ..*leg };
             let tolerance = (ONSET_CLEAR * air.noise).max(PRESSURE_ONSET * air.threshold);
@@ -62,10 +62,10 @@ pub(super) fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) 
                 direction: if leg.sign() > 0.0 { 1 } else { -1 },
                 cause: Cause::Pressure,
             });
-            told = true;
+            has_turned = true;
         }
         // What drives the muscle after the hold is its motion again, even the same way as before the hold.
-        if told {
+        if has_turned {
             let resumes = |t: &&Turn| t.index <= hold.end + 1;
             let last = turns.iter().rev().find(resumes).copied();
             let at_end = turns.iter().any(|t| t.index > hold.start && t.index <= hold.end + 2);
@@ -90,12 +90,12 @@ pub(super) fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) 
     turns
 }
 
-pub(super) fn told_turns(told: &[i8]) -> Vec<Turn> {
+pub(super) fn stated_turns(directions: &[i8]) -> Vec<Turn> {
     let mut last = 0;
     let mut turns = Vec::new();
-    for (index, way) in told.iter().copied().enumerate().filter(|(_, d)| *d != 0) {
+    for (index, way) in directions.iter().copied().enumerate().filter(|(_, d)| *d != 0) {
         if way != last {
-            turns.push(Turn { index, direction: way.signum(), cause: Cause::Told });
+            turns.push(Turn { index, direction: way.signum(), cause: Cause::Stated });
             last = way;
         }
     }

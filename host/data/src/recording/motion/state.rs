@@ -79,7 +79,7 @@ impl Motion {
         let (column, noise) = match turn.cause {
             Cause::Stroke => (&recording.stroke, self.stroke_noise),
             Cause::Pressure => (&recording.pressure, self.pressure_noise),
-            Cause::Told => return turn.index..turn.index,
+            Cause::Stated => return turn.index..turn.index,
         };
         let n = held.len().min(column.len());
         let Some(level) = column.get(turn.index).copied().filter(|_| turn.index < n) else { return 0..0 };

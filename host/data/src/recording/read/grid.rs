@@ -79,8 +79,8 @@ fn long_table(text: &[u8], description: &Import, grid: &Grid) -> Result<(String,
     let mut columns: Vec<(usize, Vec<String>)> = Vec::new();
     for (index, name) in header.names.iter().enumerate() {
         if let Some(caught) = pattern.captures(name) {
-            let told = groups.iter().map(|g| caught.name(g).map_or("", |m| m.as_str()).to_owned());
-            columns.push((index, told.collect()));
+            let names = groups.iter().map(|g| caught.name(g).map_or("", |m| m.as_str()).to_owned());
+            columns.push((index, names.collect()));
         }
     }
     if columns.is_empty() {
@@ -113,7 +113,7 @@ fn long_table(text: &[u8], description: &Import, grid: &Grid) -> Result<(String,
     names.extend(groups.iter().map(String::as_str));
     names.push(&grid.values);
     let mut long = names.join(",") + "\n";
-    for (column, told) in &columns {
+    for (column, names) in &columns {
         for (number, cells) in &rows {
             let cell = &cells[*column];
             if !cell.parse::<f64>().is_ok_and(f64::is_finite) {
@@ -130,7 +130,7 @@ fn long_table(text: &[u8], description: &Import, grid: &Grid) -> Result<(String,
                 .help("leave such cells out with missing = \"skip\""));
             }
             let mut line: Vec<&str> = others.iter().map(|i| cells[*i].as_str()).collect();
-            line.extend(told.iter().map(String::as_str));
+            line.extend(names.iter().map(String::as_str));
             line.push(cell);
             long += &line.join(",");
             long.push('\n');

@@ -171,7 +171,7 @@ fn a_dead_sensor_is_found_in_every_channel() {
 }
 
 #[test]
-fn a_drop_out_of_force_or_stroke_is_found_and_told_with_its_rows() {
+fn a_drop_out_of_force_or_stroke_is_found_and_reported_with_its_rows() {
     for channel in [Channel::Force, Channel::Stroke] {
         let campaign = spoiled(5, channel, |c| {
             let away = if channel == Channel::Force { -5.0 } else { 20e-3 };
@@ -181,7 +181,7 @@ fn a_drop_out_of_force_or_stroke_is_found_and_told_with_its_rows() {
         let found = &screened.faults;
         assert_eq!(found.len(), 1, "{channel:?}: {found:?}");
         assert_eq!((found[0].rows.clone(), found[0].kind), (620..640, Kind::DropOut));
-        assert!(screened.remark().is_some_and(|told| told.contains("`loop2` rows 621 to 640")));
+        assert!(screened.remark().is_some_and(|remark| remark.contains("`loop2` rows 621 to 640")));
         assert!(!screened.read(2)[620..640].contains(&true) && screened.read(2)[640]);
     }
 }

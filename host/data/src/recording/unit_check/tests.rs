@@ -64,11 +64,11 @@ fn every_unit_in_every_recording_of_some_force_is_found_and_nothing_else() {
             (Column::Force, 0.009_806_65),
         ] {
             let there = found(&spoiled(which, column, |v| v / factor));
-            let [(at, Mistake { column: in_column, wrong: MistakeKind::Unit(told, _) })] = there[..] else {
+            let [(at, Mistake { column: in_column, wrong: MistakeKind::Unit(found, _) })] = there[..] else {
                 panic!("{column:?} / {factor} in {which}: {there:?}");
             };
             assert_eq!((at, in_column), (which, column));
-            assert!((told / factor - 1.0).abs() < 1e-3, "{column:?} / {factor} in {which}: {told}");
+            assert!((found / factor - 1.0).abs() < 1e-3, "{column:?} / {factor} in {which}: {found}");
         }
     }
 }

@@ -40,23 +40,23 @@ fn lines_above_the_table_and_other_names_are_guessed() {
 }
 
 #[test]
-fn what_is_no_recording_is_told_with_the_remedy() {
-    let told = |name: &str, reader: &Reader<'_>| {
+fn what_is_no_recording_is_reported_with_the_remedy() {
+    let message = |name: &str, reader: &Reader<'_>| {
         let error = reader.file(&fixture(name)).expect_err(name);
         format!("{error} | {}", error.advice().unwrap_or_default())
     };
     let plain = Reader::new();
-    let several = told("two_sheets.xlsx", &plain);
+    let several = message("two_sheets.xlsx", &plain);
     assert!(
         several.contains("2 sheets with contents: notes, Run 1") && several.contains("--sheet"),
         "{several}"
     );
-    assert!(told("two_sheets.ods", &plain).contains("notes & more, Run 1"));
+    assert!(message("two_sheets.ods", &plain).contains("notes & more, Run 1"));
     let wrong = Reader { sheet: Some("Run 2".into()), ..Reader::new() };
-    assert!(told("two_sheets.xlsx", &wrong).contains("its sheets are notes, Run 1"));
-    assert!(told("dates.xlsx", &plain).contains("dates and times of day need unit = \"timestamp\""));
+    assert!(message("two_sheets.xlsx", &wrong).contains("its sheets are notes, Run 1"));
+    assert!(message("dates.xlsx", &plain).contains("dates and times of day need unit = \"timestamp\""));
     // The row of a spreadsheet is the line of the message.
-    let missing = told("missing_value.xlsx", &plain);
+    let missing = message("missing_value.xlsx", &plain);
     assert!(
         missing.contains("missing_value.xlsx:5, column force_N") && missing.contains("--missing skip"),
         "{missing}"
@@ -139,9 +139,9 @@ fn an_archive_that_unpacks_to_more_than_the_bound_is_refused() {
 }
 
 #[test]
-fn other_archives_are_told_apart() {
+fn other_archives_are_distinguished() {
     let folder = tempfile::tempdir().unwrap();
-    let told = |name: &str, bytes: &[u8]| {
+    let message = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         Reader::new().file(&path).unwrap_err().to_string()
@@ -149,8 +149,8 @@ fn other_archives_are_told_apart() {
     let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     zip.start_file("a.csv", zip::write::SimpleFileOptions::default()).unwrap();
     let archive = zip.finish().unwrap().into_inner();
-    assert!(told("a.zip", &archive).contains("no Excel or OpenDocument workbook"));
+    assert!(message("a.zip", &archive).contains("no Excel or OpenDocument workbook"));
     let mut old = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1".to_vec();
     old.resize(2048, 0);
-    assert!(told("a.xls", &old).contains(".xls"));
+    assert!(message("a.xls", &old).contains(".xls"));
 }

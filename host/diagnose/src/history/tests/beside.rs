@@ -106,18 +106,18 @@ fn recorded(bench: Bench, seed: u64) -> Campaign {
     Campaign::new(recordings)
 }
 
-fn asked(bench: Bench, seed: u64) -> Found {
+fn diagnosed(bench: Bench, seed: u64) -> Found {
     found(&recorded(bench, seed), &geometry()).expect("a campaign of staircases")
 }
 
 fn named(bench: Bench, seed: u64) -> Option<Candidate> {
-    asked(bench, seed).needed.map(|n| n.effect)
+    diagnosed(bench, seed).needed.map(|n| n.effect)
 }
 
 #[test]
 fn nothing_is_named_beside_a_memory_alone() {
     for seed in 0..3 {
-        let found = asked(Bench::default(), 500 + seed);
+        let found = diagnosed(Bench::default(), 500 + seed);
         assert!(found.answer.named, "seed {seed}: {:?}", found.answer.why_not);
         assert!(found.needed.is_none(), "seed {seed}: {:?}", found.needed);
         assert!(!found.slack_reading.as_ref().expect("slack mountings").found, "seed {seed}");
@@ -126,7 +126,7 @@ fn nothing_is_named_beside_a_memory_alone() {
 
 #[test]
 fn friction_that_the_ring_of_pulses_turns_is_named_beside_the_memory() {
-    let found = asked(Bench { friction: 12.0, ..Bench::default() }, 510);
+    let found = diagnosed(Bench { friction: 12.0, ..Bench::default() }, 510);
     assert!(found.answer.named, "{:?}", found.answer.why_not);
     let needed = found.needed.expect("an effect");
     assert_eq!(needed.effect, Candidate::Muscle(EffectName::CoulombFriction), "{needed:?}");
@@ -148,7 +148,7 @@ fn a_slack_muscle_shows_what_the_load_cell_reads() {
         (Bench { zero: -9.0, ..Bench::default() }, BenchName::ForceOffset, -9.0),
         (Bench { per_pressure: 0.03, ..Bench::default() }, BenchName::CrossTalk, 3e-5),
     ] {
-        let found = asked(bench, 540);
+        let found = diagnosed(bench, 540);
         let reading = found.slack_reading.expect("slack mountings");
         assert!(reading.found && reading.effect == effect, "{reading:?}");
         assert!((reading.amplitude / amplitude - 1.0).abs() < 0.25, "{reading:?}, {amplitude} is true");
@@ -160,7 +160,7 @@ fn a_slack_muscle_shows_what_the_load_cell_reads() {
 #[test]
 fn a_pull_that_begins_softly_is_no_reading_of_a_slack_muscle() {
     for softer in [1.5, 2.0, 3.0, 4.0] {
-        let found = asked(Bench { softer, ..Bench::default() }, 550);
+        let found = diagnosed(Bench { softer, ..Bench::default() }, 550);
         let reading = found.slack_reading;
         assert!(reading.as_ref().is_none_or(|r| !r.found), "{softer}: {reading:?}");
     }

@@ -46,7 +46,7 @@ fn a_muscle_of_13_cm_and_its_slip() {
 fn a_muscle_of_23_cm_and_its_slip() {
     agrees("2021", "23cm", 1.18, 0.50);
     let Some(h) = settled("2021", "23cm") else { return };
-    // Visible in the raw numbers, at three standard errors beside the memory: told, not named.
+    // Visible in the raw numbers, at three standard errors beside the memory: reported, not named.
     let slips: Vec<_> = h.of(FindingKind::Slip).map(|f| (f.mounting, f.run, f.found)).collect();
     assert_eq!(slips, [(Some(3), Some(3), false)], "{:?}", h.findings);
 }

@@ -113,13 +113,13 @@ pub(super) fn geometry() -> Geometry {
     table::example().geometry.cast()
 }
 
-fn asked(campaign: &Campaign) -> History {
+fn diagnosed(campaign: &Campaign) -> History {
     history(campaign, &geometry()).expect("a campaign of staircases")
 }
 
 #[test]
 fn share_and_stress_free_pressure_are_recovered() {
-    let h = asked(&campaign(MEMORY, 1));
+    let h = diagnosed(&campaign(MEMORY, 1));
     assert!(h.named, "{:?}", h.why_not);
     // The carried part counts from the threshold as it shows, which the memory itself has lowered: the product is what is determined.
     for (m, threshold) in h.mountings.iter().zip(THRESHOLDS).skip(1) {
@@ -140,7 +140,8 @@ fn a_shuffled_order_of_runs_lowers_the_gain() {
     for (m, first) in [0, MEMORY.runs, 2 * MEMORY.runs].into_iter().enumerate() {
         shuffled.recordings[first..first + MEMORY.runs].rotate_left(1 + m % 2);
     }
-    let (a, b) = (asked(&ordered).unseen.with_memory.rms_N, asked(&shuffled).unseen.with_memory.rms_N);
+    let (a, b) =
+        (diagnosed(&ordered).unseen.with_memory.rms_N, diagnosed(&shuffled).unseen.with_memory.rms_N);
     assert!(b > 1.3 * a, "{a} N in order, {b} N shuffled");
 }
 
@@ -150,7 +151,7 @@ fn campaigns_without_memory_are_not_named() {
     let offsets = Truth { slow: 1.0, offsets: 1.0, ..NO_MEMORY };
     for seed in 0..6 {
         for (what, truth) in [("white noise", NO_MEMORY), ("slow noise", slow), ("offsets", offsets)] {
-            let h = asked(&campaign(truth, 100 + seed));
+            let h = diagnosed(&campaign(truth, 100 + seed));
             assert!(!h.named && !h.why_not.is_empty(), "{what}, seed {seed}: {:?}", h.law.relaxed_share);
         }
     }
@@ -166,7 +167,7 @@ fn dry_friction_alone_is_no_memory() {
             }
         }
     }
-    let h = asked(&c);
+    let h = diagnosed(&c);
     assert!(!h.named, "{:?}", h.law.relaxed_share);
 }
 
@@ -213,7 +214,7 @@ fn no_friction_is_named_beyond_that_of_the_base_model() {
 #[test]
 fn the_gap_of_a_memory_is_not_put_down_to_friction() {
     for seed in 0..3 {
-        let h = asked(&campaign(MEMORY, 400 + seed));
+        let h = diagnosed(&campaign(MEMORY, 400 + seed));
         let gap = h.of(FindingKind::FillingEmptyingGap).next().expect("a gap");
         assert!(gap.found && gap.cause.as_deref() == Some("log-creep"), "seed {seed}: {gap:?}");
         assert!(gap.alternatives.is_empty(), "seed {seed}: {gap:?}");
@@ -222,7 +223,7 @@ fn the_gap_of_a_memory_is_not_put_down_to_friction() {
 
 #[test]
 fn a_slip_is_found_at_its_run() {
-    let h = asked(&campaign(Truth { runs: 8, slip: Some((1, 4, 15.0)), ..MEMORY }, 4));
+    let h = diagnosed(&campaign(Truth { runs: 8, slip: Some((1, 4, 15.0)), ..MEMORY }, 4));
     let slips: Vec<_> = h.of(FindingKind::Slip).filter(|f| f.found).collect();
     assert_eq!(slips.len(), 1, "{:?}", h.findings);
     assert_eq!((slips[0].mounting, slips[0].run), (Some(2), Some(5)));
@@ -239,7 +240,7 @@ fn a_single_bad_run_is_named_and_a_clean_campaign_has_none() {
             *f += pull(1e-3 * p + 20.0, THRESHOLDS[1]) - pull(1e-3 * p, THRESHOLDS[1]);
         }
     }
-    let h = asked(&c);
+    let h = diagnosed(&c);
     let bad: Vec<_> = h.of(FindingKind::BadRun).map(|f| (f.mounting, f.run)).collect();
     assert_eq!(bad, [(Some(2), Some(6))], "{:?}", h.findings);
 }
@@ -258,14 +259,14 @@ fn one_mounting_tells_a_share_but_no_stress_free_pressure() {
     let mut c = campaign(Truth { runs: 6, ..MEMORY }, 7);
     c.recordings.drain(..6);
     c.recordings.truncate(6);
-    let h = asked(&Campaign::new(c.recordings));
+    let h = diagnosed(&Campaign::new(c.recordings));
     assert!(!h.law.balance_identifiable && h.law.balance_pressure.low.is_none());
     assert_eq!(h.mountings.len(), 1);
 }
 
 #[test]
 fn of_many_runs_groups_are_left_out_and_each_run_is_predicted() {
-    let h = asked(&campaign(Truth { runs: 20, ..MEMORY }, 8));
+    let h = diagnosed(&campaign(Truth { runs: 20, ..MEMORY }, 8));
     assert_eq!(h.runs.len(), 60);
     assert_eq!(h.unseen.with_memory.points, h.points);
     assert!(h.named && h.unseen.gain > 0.5, "{:?}", h.unseen);
