@@ -16,6 +16,24 @@
 //! | all of it as a controller calls it | [`single_precision`] |
 //! | what host and controller say to each other | [`link`] |
 //!
+//! Force of a table, and the pressure for a force at the same stroke:
+//!
+//! ```
+//! use model_core::inverse::Reach;
+//! use model_core::muscle::Muscle;
+//! use model_core::table;
+//! use model_core::units::{Length, Pressure};
+//!
+//! let muscle = Muscle::<f64>::build(&table::example()).expect("a valid table");
+//! let (stroke, shortening) = (Length::from_metres(1e-3), 1.0);
+//! let force = muscle.force(Pressure::from_kilopascals(400.0), stroke, shortening);
+//!
+//! let guess = Pressure::from_kilopascals(300.0);
+//! let found = muscle.pressure_for(force, &muscle.at_stroke(stroke), shortening, guess, &muscle.search());
+//! assert_eq!(found.reach, Reach::Reached);
+//! assert!((found.pressure.pascals() - 400e3).abs() < 1.0, "to within 1 Pa");
+//! ```
+//!
 //! Source of the model: E. G. Hocking, thesis on miniature and push-type pneumatic artificial muscles, University of
 //! Maryland (2012), chapters 2 and 3.
 
