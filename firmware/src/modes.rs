@@ -5,7 +5,7 @@ use model_core::inverse::{Reach, Search};
 use model_core::link::messages::Mode;
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::motion::{Motion, Slide};
-use model_core::muscle::{AtStroke, Moment, Muscle};
+use model_core::muscle::{AtStroke, Muscle, OperatingPoint};
 use model_core::scalar::Scalar;
 use model_core::single_precision;
 use model_core::table::{MuscleTable, TableError};
@@ -27,7 +27,7 @@ pub struct Model {
     /// Physics beyond the base model.
     pub chain: Chain<f32>,
     /// The muscle in this tick. Without effects only its shape and direction are updated.
-    now: Moment<f32>,
+    now: OperatingPoint<f32>,
     /// Direction of friction; none where an effect of the table describes how friction changes after a reversal.
     slide: Option<Slide<f32>>,
     /// Distances of [`Slide`] in a metre of stroke, and in a pascal at held length.
@@ -112,7 +112,7 @@ impl Model {
             slope: 0.0,
             inv_rest_volume: 0.0,
             taut_n: 0.0,
-            now: Moment::NONE,
+            now: OperatingPoint::NONE,
             muscle: Muscle::blank(),
         }
     }

@@ -25,15 +25,15 @@
 //! let muscle = Muscle::<f32>::build(&table).expect("a valid table");
 //! let mut chain = Chain::resumed(&table.effects);
 //! let mut tracker = MotionTracker::new(MotionSettings::default());
-//! let mut moment = muscle.moment();
+//! let mut point = muscle.operating_point();
 //! let mut command = Pressure::from_kilopascals(300.0);
 //! let demanded = Force::from_newtons(30.0);
 //! for tick in 0..=1000 {
 //!     let stroke = 1.0e-6 * tick as f32; // 1 mm in a second
 //!     let motion = tracker.step(1.0e-3, stroke, command.pascals());
-//!     muscle.update(&mut moment, motion, command);
-//!     chain.step(&moment.context);
-//!     command = muscle.pressure_with(demanded, &chain, &moment, command, &muscle.search()).pressure;
+//!     muscle.update(&mut point, motion, command);
+//!     chain.step(&point.context);
+//!     command = muscle.pressure_with(demanded, &chain, &point, command, &muscle.search()).pressure;
 //! }
 //! // A tenth of the time constant has gone by: most of the over-stress is still there, and costs pressure.
 //! let at_stroke = muscle.at_stroke(Length::from_metres(1.0e-3_f32));
@@ -267,7 +267,7 @@ pub struct Info {
     pub link: Link,
     /// Its parameters, in the order in which they are stored; amplitudes first.
     pub parameters: &'static [Parameter],
-    /// Whether its force depends on the pressure of the moment (then the inverse has to iterate).
+    /// Whether its force depends on the present pressure (then the inverse has to iterate).
     pub depends_on_pressure: bool,
     /// Whether its memory has to survive a power cycle.
     pub persistent: bool,
@@ -313,7 +313,7 @@ pub trait Effect {
     const INFO: Info;
     /// What a diagnosis has to know of it.
     const TRAITS: Traits;
-    /// Lets time pass: `memory` goes from the last moment to this one.
+    /// Lets time pass: `memory` goes from the last tick to this one.
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let _ = (parameters, context, memory);
     }

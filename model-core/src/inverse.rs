@@ -4,7 +4,7 @@
 //! together once, and Newton's method runs on them; a bracket keeps it from leaving, so that it ends for every table.
 
 use crate::effects::{Chain, Context};
-use crate::muscle::{AtStroke, COMMON_ORDER, Moment, Muscle, Piece, StrokeSlopes};
+use crate::muscle::{AtStroke, COMMON_ORDER, Muscle, OperatingPoint, Piece, StrokeSlopes};
 use crate::scalar::Scalar;
 use crate::spline::{self, Cubic};
 use crate::units::{Force, Pressure};
@@ -219,7 +219,7 @@ struct Whole<'a, T> {
     at_stroke: &'a AtStroke<T>,
     slopes: &'a StrokeSlopes<T>,
     chain: &'a Chain<T>,
-    /// The present moment, moved to the pressures that are tried.
+    /// The present operating point, moved to the pressures that are tried.
     context: Context<T>,
     /// The last pressure tried and what the effects added there.
     last: Option<(T, T)>,
@@ -339,7 +339,7 @@ impl<T: Scalar> Muscle<T> {
         Err(guess)
     }
 
-    /// The pressure for a demanded force with effects, at a moment to which `chain` has been stepped.
+    /// The pressure for a demanded force with effects, at an operating point to which `chain` has been stepped.
     ///
     /// The force of effects that do not depend on pressure is subtracted exactly. Otherwise the whole force is solved for by Newton's
     /// method, with the base model's slope and a secant for that of the effects. A bracket makes the search end for every table.
@@ -348,15 +348,15 @@ impl<T: Scalar> Muscle<T> {
         &self,
         force: Force<T>,
         chain: &Chain<T>,
-        moment: &Moment<T>,
+        point: &OperatingPoint<T>,
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
         if chain.depends_on_pressure() {
-            return self.pressure_by_search(force, chain, moment, guess, search);
+            return self.pressure_by_search(force, chain, point, guess, search);
         }
-        let rest = Force::from_newtons(force.si() - chain.force(&moment.context));
-        self.pressure_for(rest, &moment.at_stroke, moment.context.direction, guess, search)
+        let rest = Force::from_newtons(force.si() - chain.force(&point.context));
+        self.pressure_for(rest, &point.at_stroke, point.context.direction, guess, search)
     }
 
     /// The same where an effect's force depends on the pressure.
@@ -365,11 +365,11 @@ impl<T: Scalar> Muscle<T> {
         &self,
         force: Force<T>,
         chain: &Chain<T>,
-        moment: &Moment<T>,
+        point: &OperatingPoint<T>,
         guess: Pressure<T>,
         search: &Search<T>,
     ) -> Solution<T> {
-        let Moment { at_stroke, slopes, context } = moment;
+        let OperatingPoint { at_stroke, slopes, context } = point;
         let context = *context;
         let mut whole =
             Whole { muscle: self, at_stroke, slopes, chain, context, last: None, effect_slope: T::ZERO };

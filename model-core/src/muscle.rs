@@ -17,7 +17,7 @@ use crate::units::{Force, Length, Pressure};
 
 mod at_stroke;
 
-pub use at_stroke::{AtStroke, Moment, Parts, StrokeSlopes};
+pub use at_stroke::{AtStroke, OperatingPoint, Parts, StrokeSlopes};
 
 /// A muscle ready to be evaluated, built once from its [`MuscleTable`]. The long curves come last, so that an instruction reaches all
 /// the rest.
@@ -276,24 +276,24 @@ impl<T: Scalar> Muscle<T> {
 
     /// All that an effect may look at, from a motion and a pressure.
     pub fn context(&self, motion: &Motion<T>, pressure: Pressure<T>) -> Context<T> {
-        let mut moment = self.moment();
-        self.update(&mut moment, motion, pressure);
-        moment.context
+        let mut point = self.operating_point();
+        self.update(&mut point, motion, pressure);
+        point.context
     }
 
-    /// A moment at rest length without pressure, to begin with.
-    pub fn moment(&self) -> Moment<T> {
-        let mut moment = Moment::NONE;
-        self.begin(&mut moment);
-        moment.at_stroke = self.at_stroke(Length::ZERO);
-        moment.slopes = self.slopes(&moment.at_stroke);
-        moment
+    /// The operating point at rest length without pressure, to begin with.
+    pub fn operating_point(&self) -> OperatingPoint<T> {
+        let mut point = OperatingPoint::NONE;
+        self.begin(&mut point);
+        point.at_stroke = self.at_stroke(Length::ZERO);
+        point.slopes = self.slopes(&point.at_stroke);
+        point
     }
 
-    /// Puts into a moment what stays the same in all of this muscle; the rest comes with [`Muscle::update`].
-    pub fn begin(&self, moment: &mut Moment<T>) {
-        *moment = Moment::NONE;
-        let context = &mut moment.context;
+    /// Puts into an operating point what stays the same in all of this muscle; the rest comes with [`Muscle::update`].
+    pub fn begin(&self, point: &mut OperatingPoint<T>) {
+        *point = OperatingPoint::NONE;
+        let context = &mut point.context;
         context.rest_length = self.braid.rest_length();
         context.fibre_length = self.braid.fibre_length();
         context.turns = self.braid.turns();
@@ -301,18 +301,23 @@ impl<T: Scalar> Muscle<T> {
         context.order = self.order_scalar;
     }
 
-    /// Brings a moment to a motion and a pressure.
+    /// Moves an operating point to a motion and a pressure.
     #[inline]
-    pub fn update(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
-        moment.at_stroke = self.at_stroke(Length::from_metres(motion.stroke));
-        moment.slopes = self.slopes(&moment.at_stroke);
-        self.fill_context(moment, motion, pressure);
+    pub fn update(&self, point: &mut OperatingPoint<T>, motion: &Motion<T>, pressure: Pressure<T>) {
+        point.at_stroke = self.at_stroke(Length::from_metres(motion.stroke));
+        point.slopes = self.slopes(&point.at_stroke);
+        self.fill_context(point, motion, pressure);
     }
 
-    /// The rest of [`Muscle::update`]: what effects look at, in a moment that has its shape and slopes already.
+    /// The rest of [`Muscle::update`]: what effects look at, at an operating point that has its shape and slopes already.
     #[inline]
-    pub(crate) fn fill_context(&self, moment: &mut Moment<T>, motion: &Motion<T>, pressure: Pressure<T>) {
-        let Moment { at_stroke, slopes, context } = moment;
+    pub(crate) fn fill_context(
+        &self,
+        point: &mut OperatingPoint<T>,
+        motion: &Motion<T>,
+        pressure: Pressure<T>,
+    ) {
+        let OperatingPoint { at_stroke, slopes, context } = point;
         let posture = &at_stroke.posture;
         context.dt = motion.dt;
         context.time = motion.time;
@@ -338,7 +343,7 @@ impl<T: Scalar> Muscle<T> {
         self.move_to(context, at_stroke, slopes, pressure);
     }
 
-    /// Moves a moment's context to another pressure than the measured one: what the force there would be.
+    /// Moves a context to another pressure than the measured one: what the force there would be.
     #[inline(always)]
     pub fn move_to(
         &self,
@@ -388,7 +393,7 @@ impl<T: Scalar> Muscle<T> {
         StrokeSlopes { area: slopes.area, columns }
     }
 
-    /// The force with the effects of `chain` at a moment that the chain has been stepped to.
+    /// The force with the effects of `chain` at an operating point to which the chain has been stepped.
     pub fn force_with(&self, chain: &Chain<T>, context: &Context<T>) -> Force<T> {
         self.pull(context.force() + chain.force(context))
     }

@@ -7,7 +7,7 @@
 use crate::effects::{Chain, Context};
 use crate::inverse::{Search, Solution};
 use crate::motion::{Motion, MotionTracker};
-use crate::muscle::{AtStroke, Moment, Muscle, Parts, StrokeSlopes};
+use crate::muscle::{AtStroke, Muscle, OperatingPoint, Parts, StrokeSlopes};
 use crate::units::{Force, Length, Pressure};
 
 /// [`Muscle::force`].
@@ -100,24 +100,29 @@ pub fn pressure_at(
 pub fn pressure_with(
     muscle: &Muscle<f32>,
     chain: &Chain<f32>,
-    moment: &Moment<f32>,
+    point: &OperatingPoint<f32>,
     force: Force<f32>,
     guess: Pressure<f32>,
     search: &Search<f32>,
 ) -> Solution<f32> {
     if chain.depends_on_pressure() {
-        return muscle.pressure_by_search(force, chain, moment, guess, search);
+        return muscle.pressure_by_search(force, chain, point, guess, search);
     }
-    let rest = Force::from_newtons(force.newtons() - effects(chain, &moment.context));
-    pressure_for(muscle, &moment.at_stroke, moment.context.direction, rest, guess, search)
+    let rest = Force::from_newtons(force.newtons() - effects(chain, &point.context));
+    pressure_for(muscle, &point.at_stroke, point.context.direction, rest, guess, search)
 }
 
 /// [`Muscle::update`].
 #[inline(never)]
-pub fn update(muscle: &Muscle<f32>, moment: &mut Moment<f32>, motion: &Motion<f32>, pressure: Pressure<f32>) {
-    hold(muscle, &mut moment.at_stroke, Length::from_metres(motion.stroke));
-    refresh_slopes(muscle, &moment.at_stroke, &mut moment.slopes);
-    muscle.fill_context(moment, motion, pressure);
+pub fn update(
+    muscle: &Muscle<f32>,
+    point: &mut OperatingPoint<f32>,
+    motion: &Motion<f32>,
+    pressure: Pressure<f32>,
+) {
+    hold(muscle, &mut point.at_stroke, Length::from_metres(motion.stroke));
+    refresh_slopes(muscle, &point.at_stroke, &mut point.slopes);
+    muscle.fill_context(point, motion, pressure);
 }
 
 /// [`Chain::step`].

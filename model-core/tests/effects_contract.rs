@@ -6,7 +6,7 @@ use model_core::effects::{
 };
 use model_core::inverse::Reach;
 use model_core::motion::{MotionSettings, MotionTracker};
-use model_core::muscle::{Moment, Muscle};
+use model_core::muscle::{Muscle, OperatingPoint};
 use model_core::table;
 use model_core::units::{Force, Length, Pressure};
 use proptest::prelude::*;
@@ -308,7 +308,7 @@ proptest! {
                 let now = contexts.last().expect("readings");
                 let at_stroke = muscle.at_stroke(Length::from_metres(now.stroke));
                 let slopes = muscle.slopes(&at_stroke);
-                let moment = Moment { at_stroke, slopes, context: *now };
+                let point = OperatingPoint { at_stroke, slopes, context: *now };
                 let force_at = |p: f64| {
                     let mut moved = *now;
                     muscle.move_to(&mut moved, &at_stroke, &slopes, Pressure::from_pascals(p));
@@ -321,7 +321,7 @@ proptest! {
                 }
                 let wanted = force_at(truth);
                 let found = muscle.pressure_with(
-                    Force::from_newtons(wanted), &chain, &moment, Pressure::from_pascals(guess), &muscle.search(),
+                    Force::from_newtons(wanted), &chain, &point, Pressure::from_pascals(guess), &muscle.search(),
                 );
                 prop_assert_eq!(found.reach, Reach::Reached, "{:?}", names);
                 let again = force_at(found.pressure.pascals());
@@ -352,9 +352,9 @@ proptest! {
         }
         let context = contexts.last().expect("readings").cast::<f32>();
         let at_stroke = muscle.at_stroke(Length::from_metres(context.stroke));
-        let moment = Moment { slopes: muscle.slopes(&at_stroke), at_stroke, context };
+        let point = OperatingPoint { slopes: muscle.slopes(&at_stroke), at_stroke, context };
         let found = muscle.pressure_with(
-            Force::from_newtons(wanted), &chain, &moment, Pressure::from_kilopascals(300.0), &muscle.search(),
+            Force::from_newtons(wanted), &chain, &point, Pressure::from_kilopascals(300.0), &muscle.search(),
         );
         prop_assert!(found.pressure.pascals() >= 0.0 && found.pressure <= muscle.max_pressure());
         if found.reach == Reach::BeyondBlockedForce {

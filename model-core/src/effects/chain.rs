@@ -80,7 +80,7 @@ impl<T: Scalar> Chain<T> {
         self.effects.is_empty()
     }
 
-    /// Whether any effect's force changes with the pressure of the moment.
+    /// Whether any effect's force changes with the present pressure.
     pub fn depends_on_pressure(&self) -> bool {
         self.depends_on_pressure
     }

@@ -155,7 +155,7 @@ fn where_nothing_is_missed_on_a_flat_part_the_search_continues_upwards() {
 #[test]
 fn no_piece_is_assumed_where_effects_may_bend_the_force() {
     let m = muscle();
-    let Moment { at_stroke, slopes, context } = &m.moment();
+    let OperatingPoint { at_stroke, slopes, context } = &m.operating_point();
     let (chain, context) = (&Chain::none(), *context);
     let whole = Whole { muscle: &m, at_stroke, slopes, chain, context, last: None, effect_slope: 0.0 };
     assert!([0.0, 76.5e3, 300e3, 600e3].into_iter().all(|pascals| !whole.holds(pascals)));
@@ -187,16 +187,16 @@ fn a_force_with_effects_is_inverted_in_few_steps() {
         [(EffectName::PressureFriction, &[0.5, 0.5]), (EffectName::CoulombFriction, &[0.0, 5.0])];
     for (effect, parameters) in effects {
         let mut chain = Chain::<f64>::new(&[FittedEffect::new(effect, parameters)]);
-        let mut moment = m.moment();
+        let mut point = m.operating_point();
         for (answer, guess) in ON_A_PIECE {
             let motion = Motion { stroke: 1e-3, direction: 1.0, dt: 1e-3, ..Motion::default() };
-            m.update(&mut moment, &motion, Pressure::from_pascals(answer));
-            chain.step(&moment.context);
-            let added = chain.force(&moment.context);
+            m.update(&mut point, &motion, Pressure::from_pascals(answer));
+            chain.step(&point.context);
+            let added = chain.force(&point.context);
             assert!(added < -1.0, "{effect:?} adds {added} N");
-            let force = m.force_with(&chain, &moment.context);
-            m.update(&mut moment, &motion, Pressure::from_pascals(guess));
-            let found = m.pressure_with(force, &chain, &moment, Pressure::from_pascals(guess), &fine(&m));
+            let force = m.force_with(&chain, &point.context);
+            m.update(&mut point, &motion, Pressure::from_pascals(guess));
+            let found = m.pressure_with(force, &chain, &point, Pressure::from_pascals(guess), &fine(&m));
             assert!((found.pressure.pascals() - answer).abs() < 1e-3, "{found:?}, not {answer}: {effect:?}");
             assert!(found.steps <= 5, "{} steps from {guess} to {answer}: {effect:?}", found.steps);
         }

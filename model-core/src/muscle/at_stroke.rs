@@ -1,4 +1,4 @@
-//! The muscle at one stroke and at one moment.
+//! The muscle at one stroke and at one operating point.
 
 use crate::braid::Posture;
 use crate::effects::Context;
@@ -23,9 +23,9 @@ pub struct StrokeSlopes<T> {
     pub columns: [T; MAX_ORDER],
 }
 
-/// One moment of a muscle with effects, kept from tick to tick so that what never changes is written once.
+/// The operating point of a muscle with effects: stroke, pressure and motion; kept from tick to tick so that what never changes is written once.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment<T> {
+pub struct OperatingPoint<T> {
     /// The muscle at the measured stroke.
     pub at_stroke: AtStroke<T>,
     /// How that changes with stroke.
@@ -39,7 +39,7 @@ impl<T: Scalar> AtStroke<T> {
     pub const NONE: Self = Self { posture: Posture::NONE, columns: [T::ZERO; MAX_ORDER] };
 }
 
-impl<T: Scalar> Moment<T> {
+impl<T: Scalar> OperatingPoint<T> {
     /// All zeros, for a place that is not filled yet.
     pub const NONE: Self = Self {
         at_stroke: AtStroke::NONE,
@@ -48,7 +48,7 @@ impl<T: Scalar> Moment<T> {
     };
 }
 
-/// The parts of the base model's force at one moment, N and N/Pa.
+/// The parts of the base model's force at one operating point, N and N/Pa.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts<T> {
     /// `F_G(P′, L)`.

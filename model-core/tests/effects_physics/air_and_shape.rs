@@ -7,29 +7,35 @@ use model_core::muscle::Muscle;
 use model_core::table;
 use model_core::units::{Length, Pressure};
 
-use super::{Alone, close, moment};
+use super::{Alone, close, context};
 
 #[test]
 fn a_late_pressure_costs_flow_times_resistance() {
     let mut alone = Alone::new("pressure-lag", &[1e9, 0.1, 0.0, 0.2]);
-    alone.at(moment());
+    alone.at(context());
     // 10 mm/s with 1 cm² draw 1 cm³/s; 1e9 Pa·s/m³ cost 1 kPa of 1e-4 N/Pa. 20 kPa/s for 0.1 s cost 2 kPa.
-    let moving = Context { dt: 0.1, speed: 0.01, pressure_rate: 20e3, ..moment() };
+    let moving = Context { dt: 0.1, speed: 0.01, pressure_rate: 20e3, ..context() };
     for _ in 0..100 {
         alone.at(moving);
     }
     close(alone.at(moving), -0.1 - 0.2, 1e-9);
     // It decays in a dwell, as viscous friction does not.
-    let dwell = Context { dt: 1e-9, ..moment() };
+    let dwell = Context { dt: 1e-9, ..context() };
     close(alone.at(dwell), -0.3, 2e-3);
-    close(alone.at(Context { dt: 0.2, ..moment() }), -0.3 * (-1.0_f64).exp(), 2e-2);
+    close(alone.at(Context { dt: 0.2, ..context() }), -0.3 * (-1.0_f64).exp(), 2e-2);
 }
 
 #[test]
 fn a_muscle_that_fills_by_mass_loses_what_the_gas_law_asks_for() {
     let mut alone = Alone::new("pressure-lag", &[0.0, 0.0, 0.1, 0.2]);
-    let moving =
-        Context { dt: 0.1, speed: 0.01, pressure: 200e3, pressure_rate: 20e3, rest_radius: 4e-3, ..moment() };
+    let moving = Context {
+        dt: 0.1,
+        speed: 0.01,
+        pressure: 200e3,
+        pressure_rate: 20e3,
+        rest_radius: 4e-3,
+        ..context()
+    };
     for _ in 0..100 {
         alone.at(moving);
     }
@@ -43,7 +49,7 @@ fn a_muscle_that_fills_by_mass_loses_what_the_gas_law_asks_for() {
 #[test]
 fn below_contact_the_pressure_does_not_pull_and_above_it_lost_what_contact_took() {
     let at = |corrected_pressure: f64| {
-        let c = Context { corrected_pressure, radial_strain: 0.5, ..moment() };
+        let c = Context { corrected_pressure, radial_strain: 0.5, ..context() };
         corrected_pressure * c.area + Alone::new("contact-loss", &[1.0, 0.0, 1e5]).at(c)
     };
     close(at(20e3), 0.0, 1e-12);
@@ -60,7 +66,7 @@ fn stretching_fibres_change_gaylords_force_by_their_first_order() {
     let tension = pressure * length * b / (2.0 * core::f64::consts::PI * n * n);
     let gaylord = |b: f64| pressure * (3.0 * length * length - b * b) / (4.0 * core::f64::consts::PI * n * n);
     let change = gaylord(b * (1.0 + tension * compliance)) - gaylord(b);
-    let c = Context { corrected_pressure: pressure, length, fibre_length: b, turns: n, ..moment() };
+    let c = Context { corrected_pressure: pressure, length, fibre_length: b, turns: n, ..context() };
     let force = Alone::new("braid-elasticity", &[compliance]).at(c);
     close(force, change, 1e-3 * change.abs());
     assert!(force < 0.0);
@@ -127,7 +133,7 @@ fn a_table_of_lower_order_is_completed_by_the_next_terms() {
 
 #[test]
 fn shapes_of_the_ends_the_wall_and_the_leak() {
-    let c = Context { contraction: 0.1, corrected_pressure: 3e5, pressure: 3e5, ..moment() };
+    let c = Context { contraction: 0.1, corrected_pressure: 3e5, pressure: 3e5, ..context() };
     let area = core::f64::consts::PI * 25e-6;
     close(Alone::new("tip-effect", &[1.0, 0.0]).at(c), -3e5 * area * 0.05 * 0.1, 1e-12);
     // The slope of the air that tapers do not hold, π R (R − R0)².
@@ -144,7 +150,7 @@ fn shapes_of_the_ends_the_wall_and_the_leak() {
         length: at(stroke).length,
         turns: braid.turns(),
         corrected_pressure: 3e5,
-        ..moment()
+        ..context()
     };
     let slope = (lost(stroke + h) - lost(stroke - h)) / (2.0 * h);
     close(Alone::new("tip-effect", &[0.0, 1.0]).at(tapered), -3e5 * slope, 1e-4 * 3e5 * slope);

@@ -6,14 +6,14 @@ use model_core::muscle::Muscle;
 use model_core::table;
 use model_core::units::Pressure;
 
-use super::{Alone, close, moment};
+use super::{Alone, close, context};
 
 /// The strands' travel without the pressure's part.
 fn travelled(alone: &mut Alone, from: f64, to: f64, direction: f64) -> f64 {
     let mut force = 0.0;
     for i in 1..=200 {
         let stroke = from + (to - from) * f64::from(i) / 200.0;
-        force = alone.at(Context { stroke, direction, friction: 0.1, quasi: 100.0, ..moment() });
+        force = alone.at(Context { stroke, direction, friction: 0.1, quasi: 100.0, ..context() });
     }
     force
 }
@@ -58,7 +58,7 @@ fn an_inner_loop_closes_and_a_larger_one_wipes_it_out() {
     // Rate independent: the same way in one reading.
     let mut quick = Alone::new("minor-loop-memory", &[10.0, 0.0, 4e-3]);
     for stroke in [0.0, 6e-3, 3e-3, 5e-3, 3e-3] {
-        quick.at(Context { stroke, ..moment() });
+        quick.at(Context { stroke, ..context() });
     }
     for (a, b) in quick.memory[..6].iter().zip(&alone.memory[..6]) {
         close(*a, *b, 1e-9);
@@ -70,12 +70,12 @@ fn an_inner_loop_closes_and_a_larger_one_wipes_it_out() {
 #[test]
 fn at_held_length_filling_slides_the_strands_as_shortening_does() {
     let mut memory = [0.0; MEMORY];
-    BraidTravel::step(&Context { pressure: 1e5, ..moment() }, &mut memory, 0);
+    BraidTravel::step(&Context { pressure: 1e5, ..context() }, &mut memory, 0);
     // 10 kPa on 1 cm² pull 1 N more; at 10 N/mm that is 0.1 mm of free motion, and a twentieth of it of slip.
-    close(BraidTravel::step(&Context { pressure: 1.1e5, ..moment() }, &mut memory, 0), 5e-6, 1e-12);
-    close(BraidTravel::step(&Context { pressure: 1e5, ..moment() }, &mut memory, 0), -5e-6, 1e-12);
+    close(BraidTravel::step(&Context { pressure: 1.1e5, ..context() }, &mut memory, 0), 5e-6, 1e-12);
+    close(BraidTravel::step(&Context { pressure: 1e5, ..context() }, &mut memory, 0), -5e-6, 1e-12);
     // Without stiffness the travel stays bounded.
-    let limp = Context { pressure: 2e5, stiffness: 0.0, ..moment() };
+    let limp = Context { pressure: 2e5, stiffness: 0.0, ..context() };
     assert!(BraidTravel::step(&limp, &mut memory, 0).abs() <= 0.1);
 }
 
@@ -85,10 +85,10 @@ fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
         let mut alone = Alone::new("breakaway-friction", &[5.0, 0.0, 0.0, 0.2e-3, 10.0]);
         let mut force = 0.0;
         for i in 1..=10 {
-            force = alone.at(Context { hold_time: rest * f64::from(i) / 10.0, direction: 1.0, ..moment() });
+            force = alone.at(Context { hold_time: rest * f64::from(i) / 10.0, direction: 1.0, ..context() });
         }
         assert_eq!(force, 0.0, "nothing is added at rest");
-        alone.at(Context { stroke: gone, hold_time: rest, direction: 1.0, speed: 1e-3, ..moment() })
+        alone.at(Context { stroke: gone, hold_time: rest, direction: 1.0, speed: 1e-3, ..context() })
     };
     let aged = |age: f64| -5.0 * (age / 10.0).ln_1p();
     close(stuck(10.0, 0.0), aged(10.0), 1e-6);
@@ -104,9 +104,9 @@ fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
         hold_time,
         direction,
         speed: 1e-3,
-        ..moment()
+        ..context()
     };
-    alone.at(Context { hold_time: 50.0, resting: 1.0, direction: 1.0, ..moment() });
+    alone.at(Context { hold_time: 50.0, resting: 1.0, direction: 1.0, ..context() });
     assert!(alone.at(moving(1e-5, 50.0, 1.0)) < -4.0);
     assert!(alone.at(moving(5e-3, 50.0, 1.0)).abs() < 1e-6);
     close(alone.at(moving(4.9e-3, 0.0, -1.0)), 0.0, 1e-12);
@@ -116,7 +116,7 @@ fn after_a_rest_it_sticks_the_longer_the_rest_and_lets_go_over_its_distance() {
 #[test]
 fn slow_motion_rubs_more_and_the_seal_at_any_force() {
     let at = |name: &str, parameters: &[f64], speed: f64, direction: f64| {
-        Alone::new(name, parameters).at(Context { speed, direction, pressure: 2e5, quasi: 0.0, ..moment() })
+        Alone::new(name, parameters).at(Context { speed, direction, pressure: 2e5, quasi: 0.0, ..context() })
     };
     let stribeck = |v: f64| at("stribeck-friction", &[2.0, 0.0, 1e-3], v, 1.0);
     close(stribeck(0.0), -2.0, 1e-12);
@@ -125,28 +125,28 @@ fn slow_motion_rubs_more_and_the_seal_at_any_force() {
     // 1 N + 1e-5 m² (101.325 + 200) kPa, twice that at rest.
     let mut seal = Alone::new("seal-friction", &[1.0, 1e-5, 2.0, 1e-3]);
     let mut seal =
-        |speed: f64, direction: f64| seal.at(Context { speed, direction, pressure: 2e5, ..moment() });
+        |speed: f64, direction: f64| seal.at(Context { speed, direction, pressure: 2e5, ..context() });
     close(seal(1.0, 1.0), -4.013_25, 1e-9);
     close(seal(0.0, -1.0), -2.0 * 4.013_25, 1e-9);
 }
 
 #[test]
 fn speed_and_pressure_laws() {
-    let moving = Context { speed: 4e-3, direction: 1.0, pressure: 2e5, quasi: 50.0, ..moment() };
+    let moving = Context { speed: 4e-3, direction: 1.0, pressure: 2e5, quasi: 50.0, ..context() };
     close(Alone::new("viscous-damping", &[100.0, 1e-3]).at(moving), -(100.0 + 200.0) * 4e-3, 1e-12);
     close(Alone::new("rate-power", &[0.01, 0.5]).at(moving), -0.01 * 50.0 * 2.0, 1e-12);
     let mut coulomb = Alone::new("coulomb-friction", &[3.0, 0.0]);
     // At held length the pressure turns the braid's friction, not a guide's.
-    assert_eq!(coulomb.at(Context { direction: -1.0, ..moment() }), 0.0);
-    close(coulomb.at(Context { direction: -1.0, speed: -1e-3, ..moment() }), 3.0, 0.0);
-    close(coulomb.at(Context { direction: 1.0, ..moment() }), 3.0, 0.0);
+    assert_eq!(coulomb.at(Context { direction: -1.0, ..context() }), 0.0);
+    close(coulomb.at(Context { direction: -1.0, speed: -1e-3, ..context() }), 3.0, 0.0);
+    close(coulomb.at(Context { direction: 1.0, ..context() }), 3.0, 0.0);
     // Found at rest a centimetre further in, it came there by shortening.
     let mut moved = Alone::new("coulomb-friction", &[3.0, 0.0]);
-    moved.at(Context { stroke: 0.0, resting: 1.0, ..moment() });
-    close(moved.at(Context { stroke: 0.01, resting: 1.0, direction: -1.0, ..moment() }), -3.0, 0.0);
+    moved.at(Context { stroke: 0.0, resting: 1.0, ..context() });
+    close(moved.at(Context { stroke: 0.01, resting: 1.0, direction: -1.0, ..context() }), -3.0, 0.0);
     // Strands that rub follow the pressure.
     let mut strands = Alone::new("coulomb-friction", &[0.0, 3.0]);
-    close(strands.at(Context { resting: 1.0, direction: -1.0, ..moment() }), 3.0, 0.0);
+    close(strands.at(Context { resting: 1.0, direction: -1.0, ..context() }), 3.0, 0.0);
     let area = core::f64::consts::PI * 25e-6;
     close(Alone::new("pressure-friction", &[0.1, 0.0]).at(moving), -0.1 * 2e5 * area, 1e-12);
     let unchanging = Alone::new("pressure-friction", &[0.0, 0.1]).at(Context { rest_radius: 4e-3, ..moving });

@@ -26,7 +26,7 @@ impl Alone {
     }
 }
 
-fn moment() -> Context<f64> {
+fn context() -> Context<f64> {
     Context {
         // It pulls: the elastic force is smaller than Gaylord's.
         gaylord: 500.0,
@@ -42,8 +42,8 @@ fn moment() -> Context<f64> {
 
 /// A muscle whose gas pulls with `gas` and whose bladder takes `bladder` (negative) from it, N.
 fn loaded(gas: f64, bladder: f64) -> Context<f64> {
-    let area = moment().area;
-    Context { pressure: gas / area, area, gaylord: gas, elastic: bladder, quasi: gas + bladder, ..moment() }
+    let area = context().area;
+    Context { pressure: gas / area, area, gaylord: gas, elastic: bladder, quasi: gas + bladder, ..context() }
 }
 
 /// The same, well filled.

@@ -2,13 +2,13 @@
 
 use model_core::effects::{Context, EffectName, MEMORY};
 
-use super::{Alone, close, held, loaded, moment};
+use super::{Alone, close, context, held, loaded};
 
 #[test]
 fn over_a_step_the_stress_relaxes_exponentially_however_time_is_cut() {
     for cuts in [1, 7, 1000, 30_000] {
         let mut alone = Alone::new("stress-relaxation", &[0.2, 0.0, 0.0, 10.0]);
-        alone.at(moment());
+        alone.at(context());
         let strained = Context { dt: 1e-6, ..held(-50.0) };
         close(alone.at(strained), -10.0, 2e-3);
         for _ in 0..cuts {
@@ -22,7 +22,7 @@ fn over_a_step_the_stress_relaxes_exponentially_however_time_is_cut() {
 fn a_ramp_is_stepped_over_exactly() {
     // dq/dt = r − q/τ from rest: q = r τ (1 − e^(−t/τ)).
     let mut alone = Alone::new("stress-relaxation", &[1.0, 0.0, 0.0, 2.0]);
-    alone.at(moment());
+    alone.at(context());
     for i in 1..=3 {
         let t = 1.7 * f64::from(i);
         let force = alone.at(Context { dt: 1.7, ..held(-4.0 * t) });
@@ -34,7 +34,7 @@ fn a_ramp_is_stepped_over_exactly() {
 fn a_pause_of_a_month_or_without_end_relaxes_all_and_keeps_on() {
     for pause in [2.6e6, f64::INFINITY] {
         let mut alone = Alone::new("log-creep", &[0.1, 0.0, 0.0, 1.0]);
-        alone.at(moment());
+        alone.at(context());
         alone.at(Context { dt: 1e-6, ..held(-50.0) });
         close(alone.at(Context { dt: pause, ..held(-50.0) }), 0.0, 1e-3 * 25.0);
         let again = alone.at(Context { dt: 1e-9, ..held(-60.0) });
@@ -45,7 +45,7 @@ fn a_pause_of_a_month_or_without_end_relaxes_all_and_keeps_on() {
 #[test]
 fn creep_falls_by_its_amplitude_in_each_decade_of_time() {
     let mut alone = Alone::new("log-creep", &[0.1, 0.0, 0.0, 1.0]);
-    alone.at(moment());
+    alone.at(context());
     let strained = Context { dt: 1e-6, ..held(-50.0) };
     let start = alone.at(strained);
     let mut time = 0.0;
@@ -110,7 +110,7 @@ fn a_bladder_creeps_with_two_signs_and_the_next_run_remembers_it() {
 #[test]
 fn a_fresh_pull_yields_and_remembers_it() {
     let mut alone = Alone::new("log-creep", &[0.0, 0.0, 0.02, 0.5]);
-    let pulling = Context { quasi: 100.0, friction: 0.1, direction: 1.0, ..moment() };
+    let pulling = Context { quasi: 100.0, friction: 0.1, direction: 1.0, ..context() };
     // The first moment is a fresh load, of which nothing has yielded; then 2 % of what it pulls in each decade of time.
     assert_eq!(alone.at(pulling), 0.0);
     for (time, dt) in [(1.0, 1.0), (10.0, 9.0), (100.0, 90.0)] {
@@ -143,7 +143,7 @@ fn at_a_thousand_ticks_a_second_single_precision_keeps_slow_memories() {
     let effect = EffectName::StressRelaxation;
     let parameters = [1.0_f32, 0.0, 0.0, 1000.0];
     let mut memory = [0.0_f32; MEMORY];
-    effect.step(&parameters, &moment().cast(), &mut memory);
+    effect.step(&parameters, &context().cast(), &mut memory);
     let strained = Context { dt: 1e-3, ..held(-50.0) }.cast::<f32>();
     for _ in 0..200_000 {
         effect.step(&parameters, &strained, &mut memory);

@@ -2,7 +2,7 @@
 
 use model_core::effects::Context;
 
-use super::{Alone, close, held, loaded, moment};
+use super::{Alone, close, context, held, loaded};
 
 /// A stretch of the bladder: radial strain up, axial down, an elastic force that resists.
 fn stretched(strain: f64) -> Context<f64> {
@@ -93,19 +93,19 @@ fn set_grows_with_the_path_and_a_power_up_does_not_undo_it() {
             1..=100 => (phase, 1.0),
             _ => (200 - phase, -1.0),
         };
-        alone.at(Context { stroke: 5e-5 * f64::from(stroke), direction, ..moment() });
+        alone.at(Context { stroke: 5e-5 * f64::from(stroke), direction, ..context() });
     }
     let expected = -1e4 * 1e-3 * (1.0 - (-2.0_f64).exp());
-    close(alone.at(moment()), expected, 2e-2);
+    close(alone.at(context()), expected, 2e-2);
     // Somewhere else after a power-up, with the direction unknown.
-    close(alone.at(Context { stroke: 4e-3, ..moment() }), expected, 2e-2);
+    close(alone.at(Context { stroke: 4e-3, ..context() }), expected, 2e-2);
 }
 
 #[test]
 fn set_by_load_grows_with_its_impulse() {
     let mut alone = Alone::new("permanent-set", &[0.0, 1e-3, 0.5, 1e4]);
     for _ in 0..1000 {
-        alone.at(Context { dt: 0.1, quasi: 50.0, ..moment() });
+        alone.at(Context { dt: 0.1, quasi: 50.0, ..context() });
     }
-    close(alone.at(moment()), -1e4 * 1e-3 * (1.0 - (-0.5_f64).exp()), 1e-2);
+    close(alone.at(context()), -1e4 * 1e-3 * (1.0 - (-0.5_f64).exp()), 1e-2);
 }
