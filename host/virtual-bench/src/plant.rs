@@ -12,122 +12,17 @@
 //! ```
 
 use crate::bench::BenchSpec;
-use crate::lockstep::{Answer, Station};
 use crate::muscle::Muscle;
 use crate::pneumatics::{Air, Pneumatics};
 use crate::rig::RigState;
 use crate::sensors::Channel;
 use crate::valves::{Open, ValvePair, Valves};
-use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
 
-/// What moves the muscle's free end during a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Motion {
-    /// The length is held.
-    Held {
-        /// Contraction stroke, mm.
-        stroke_mm: f64,
-    },
-    /// The length swings: `mean + amplitude sin(2π f t)`.
-    Sine {
-        /// Mean stroke, mm.
-        mean_mm: f64,
-        /// Amplitude, mm.
-        amplitude_mm: f64,
-        /// Frequency f, Hz.
-        #[serde(rename = "frequency_Hz")]
-        frequency_hz: f64,
-    },
-    /// The length follows straight lines between points (time in s, stroke in mm); it stays at the last.
-    Path {
-        /// The points, times rising.
-        points: Vec<(f64, f64)>,
-    },
-    /// The muscle moves a mass against a spring: `m a = F − preload − k x − c v`, between stops.
-    Load {
-        /// Mass, kg.
-        #[serde(rename = "mass_kg")]
-        mass: f64,
-        /// Spring, N/mm.
-        #[serde(rename = "spring_N_mm", default)]
-        spring: f64,
-        /// Constant pull against the muscle, N.
-        #[serde(rename = "preload_N", default)]
-        preload: f64,
-        /// Damper, N s/mm.
-        #[serde(rename = "damper_N_s_mm", default)]
-        damper: f64,
-    },
-}
+mod motion;
+mod station;
 
-/// The scripts of a plant file: `[[script]]` tables.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Scripts {
-    /// In the order in which the board asks for them by number.
-    pub script: Vec<Motion>,
-}
-
-impl Scripts {
-    /// Read a TOML file of `[[script]]` tables; the error is the parser's, or says which number cannot be.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
-        let scripts: Self = toml::from_str(text).map_err(|e| e.to_string())?;
-        for (i, s) in scripts.script.iter().enumerate() {
-            s.check().map_err(|what| format!("script {i}: {what}"))?;
-        }
-        Ok(scripts)
-    }
-}
-
-impl Motion {
-    /// Refuse numbers that cannot be.
-    pub fn check(&self) -> Result<(), &'static str> {
-        let finite = |x: &[f64]| x.iter().all(|v| v.is_finite());
-        let good = match self {
-            Self::Held { stroke_mm } => finite(&[*stroke_mm]),
-            Self::Sine { mean_mm, amplitude_mm, frequency_hz } => {
-                finite(&[*mean_mm, *amplitude_mm, *frequency_hz])
-            }
-            Self::Path { points } => {
-                if points.is_empty() || points.windows(2).any(|w| w[1].0 <= w[0].0) {
-                    return Err("a path needs points with rising times");
-                }
-                points.iter().all(|p| finite(&[p.0, p.1]))
-            }
-            Self::Load { mass, spring, preload, damper } => {
-                if *mass <= 0.0 {
-                    return Err("a load needs a mass above zero");
-                }
-                finite(&[*mass, *spring, *preload, *damper])
-            }
-        };
-        if good { Ok(()) } else { Err("numbers must be finite") }
-    }
-
-    /// Stroke (m) that is prescribed at a time (s), and whether the script is over.
-    fn stroke(&self, t: f64) -> (f64, bool) {
-        match self {
-            Self::Held { stroke_mm } => (stroke_mm * 1e-3, false),
-            Self::Sine { mean_mm, amplitude_mm, frequency_hz } => {
-                ((mean_mm + amplitude_mm * (TAU * frequency_hz * t).sin()) * 1e-3, false)
-            }
-            Self::Path { points } => {
-                let after = points.iter().position(|p| p.0 > t);
-                match after {
-                    Some(0) => (points[0].1 * 1e-3, false),
-                    Some(i) => {
-                        let (a, b) = (points[i - 1], points[i]);
-                        ((a.1 + (b.1 - a.1) * (t - a.0) / (b.0 - a.0)) * 1e-3, false)
-                    }
-                    None => (points.last().map_or(0.0, |p| p.1) * 1e-3, true),
-                }
-            }
-            Self::Load { .. } => (0.0, false),
-        }
-    }
-}
+pub use motion::{Motion, Scripts};
+pub use station::{LogRow, PlantStation};
 
 /// What the controller's sensors read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -316,94 +211,6 @@ impl Plant {
     }
 }
 
-/// A line of the bench's own log of a lock-step run.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LogRow {
-    /// Time in the run, s.
-    pub time: f64,
-    /// Number of the script.
-    pub script: u16,
-    /// What the board commanded, Pa.
-    pub command: f64,
-    /// The board's reported setpoint, N.
-    pub setpoint: f64,
-    /// What was true.
-    pub truth: Readings,
-}
-
-/// A plant behind the lock-step wire.
-#[derive(Debug)]
-pub struct PlantStation {
-    bench: BenchSpec,
-    scripts: Vec<Motion>,
-    period: f64,
-    plant: Plant,
-    script: u16,
-    time: f64,
-    log: Vec<LogRow>,
-}
-
-impl PlantStation {
-    /// A bench with motion scripts and a control period (s). Without scripts the muscle is held at rest length.
-    pub fn new(bench: BenchSpec, scripts: Vec<Motion>, period: f64) -> Self {
-        let scripts = if scripts.is_empty() { vec![Motion::Held { stroke_mm: 0.0 }] } else { scripts };
-        let plant = Plant::new(&bench, &scripts[0]);
-        Self { bench, scripts, period, plant, script: 0, time: 0.0, log: Vec::new() }
-    }
-
-    /// The plant.
-    pub fn plant(&mut self) -> &mut Plant {
-        &mut self.plant
-    }
-
-    /// What happened, one row per period.
-    pub fn log(&self) -> &[LogRow] {
-        &self.log
-    }
-
-    fn answer(&self) -> Answer {
-        let r = self.plant.readings();
-        let mut status = 0;
-        if self.plant.done() {
-            status |= Answer::SCRIPT_DONE;
-        }
-        if self.plant.truth().pressure > 1.25 * self.bench.muscle.max_pressure {
-            status |= Answer::BURST;
-        }
-        Answer {
-            status,
-            temperature_centi: (r.temperature * 100.0).round() as i16,
-            tick: 0,
-            pressure: r.pressure as f32,
-            stroke: r.stroke as f32,
-            force: r.force as f32,
-        }
-    }
-}
-
-impl Station for PlantStation {
-    fn reset(&mut self, script: u16) -> Answer {
-        let motion = self.scripts.get(usize::from(script)).unwrap_or(&self.scripts[0]);
-        self.plant = Plant::with_muscle(self.plant.muscle.clone(), &self.bench, motion);
-        self.script = script;
-        self.time = 0.0;
-        self.answer()
-    }
-
-    fn step(&mut self, pressure_command: f32, setpoint: f32) -> Answer {
-        self.plant.step(self.period, f64::from(pressure_command));
-        self.time += self.period;
-        self.log.push(LogRow {
-            time: self.time,
-            script: self.script,
-            command: f64::from(pressure_command),
-            setpoint: f64::from(setpoint),
-            truth: self.plant.truth(),
-        });
-        self.answer()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -456,15 +263,5 @@ mod tests {
         }
         eprintln!("a tick takes as long as {:.1} quasi-static forces", tick / force);
         assert!(tick < 40.0 * force, "{tick} s and {force} s for two thousand");
-    }
-
-    #[test]
-    fn scripts_come_from_a_file_and_bad_ones_are_refused() {
-        let good = "[[script]]\nkind = \"path\"\npoints = [[0.0, 0.0], [1.0, 2.0]]\n[[script]]\nkind = \"load\"\nmass_kg = 1.0\n";
-        let scripts = Scripts::from_toml(good).expect("good");
-        assert_eq!(scripts.script[0].stroke(0.5), (1e-3, false));
-        assert!(scripts.script[0].stroke(1.5).1);
-        assert!(Scripts::from_toml("[[script]]\nkind = \"path\"\npoints = []\n").is_err());
-        assert!(Scripts::from_toml("[[script]]\nkind = \"load\"\nmass_kg = 0.0\n").is_err());
     }
 }
