@@ -156,16 +156,15 @@ fn described(
     let column = &sample.columns[n];
     let header = &column.header;
     let on_column = |text: String| Note::on_column(header, Some(quantity), text);
-    let (unit, mut scale, mut offset) = match unit_of(column, quantity, others) {
-        Ok((found, check)) => {
-            guess.checks.extend(check.map(&on_column));
-            found
-        }
+    let found = match unit_of(column, quantity, others) {
+        Ok(found) => found,
         Err(unknown) => {
             guess.unknown.push(on_column(unknown));
             return None;
         }
     };
+    guess.checks.extend(found.check.map(&on_column));
+    let (unit, mut scale, mut offset) = (found.unit, found.scale, found.offset);
     let (low, high) = column.range();
     if quantity == Quantity::Pressure && column.name.absolute() {
         // Standard atmosphere; the pressure of the day differs by a few per cent of it.
@@ -210,13 +209,19 @@ fn described(
     })
 }
 
-/// The unit of a column with its scale and offset, and what the user must check; as an error, why the unit is not known.
-fn unit_of(
-    column: &SampleColumn,
-    quantity: Quantity,
-    others: &Others<'_>,
-) -> Result<((&'static str, f64, f64), Option<String>), String> {
+/// The unit of a column.
+struct GuessedUnit {
+    unit: &'static str,
+    scale: f64,
+    offset: f64,
+    /// What the user must check.
+    check: Option<String>,
+}
+
+/// The unit of a column; as an error, why it is not known.
+fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Result<GuessedUnit, String> {
     let (header, what) = (&column.header, quantity.name().replace('_', " "));
+    let plain = GuessedUnit { unit: "", scale: 1.0, offset: 0.0, check: None };
     if column.name.is_raw() {
         let unit = column.name.unit.map_or("", |u| u.text);
         return Err(format!(
@@ -224,7 +229,8 @@ fn unit_of(
         ));
     }
     if let Some(spelled) = column.name.unit {
-        return Ok(((spelled.unit, spelled.scale, spelled.offset), None));
+        let (unit, scale, offset) = (spelled.unit, spelled.scale, spelled.offset);
+        return Ok(GuessedUnit { unit, scale, offset, check: None });
     }
     if let Some(text) = &column.name.unknown_unit {
         return Err(format!("{header} looks like {what}, but its unit `{text}` is not known"));
@@ -232,10 +238,10 @@ fn unit_of(
     if quantity == Quantity::Contraction && largest(column, others) > 1.0 {
         let reached = short(largest(column, others));
         let check = format!("{header} is taken as per cent, since it reaches {reached}");
-        return Ok((("", 0.01, 0.0), Some(check)));
+        return Ok(GuessedUnit { scale: 0.01, check: Some(check), ..plain });
     }
     if quantity.units().len() <= 1 {
-        return Ok((("", 1.0, 0.0), None));
+        return Ok(plain);
     }
     let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
         let (low, high) = column.range();
@@ -245,14 +251,14 @@ fn unit_of(
             short(high)
         ));
     };
-    let unit = suggested.unit;
+    let (unit, scale) = (suggested.unit, suggested.scale);
     let others = if suggested.others.is_empty() {
         String::new()
     } else {
         format!(" (or {})", suggested.others.join(", "))
     };
     let check = format!("{header} does not say its unit; its values look like {unit}{others}");
-    Ok(((unit, suggested.scale, 0.0), Some(check)))
+    Ok(GuessedUnit { unit, scale, check: Some(check), ..plain })
 }
 
 /// The largest number of a column in all files, of either sign.
