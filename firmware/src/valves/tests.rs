@@ -98,7 +98,7 @@ fn after_a_vent_the_vent_valve_has_time_to_close() {
 }
 
 #[test]
-fn integrators_are_reported_what_the_valves_cannot_follow_and_in_which_direction() {
+fn integrators_receive_what_the_valves_cannot_follow_and_in_which_direction() {
     let mut bench = Bench::new(|_| ());
     assert_eq!(bench.pair.limited_pa(), 0.0);
     bench.hold(600e3, 1);

@@ -123,7 +123,12 @@ fn drop_what_does_not_help(
         // An effect that takes a third of what is above the noise lowers the whole by more than this.
         let tested = selection.selected[last].p <= FAMILY_ALPHA;
         let (without, with, helps) = unseen.last_helps(&selection.traces, tested);
-        let failed = if helps { unseen.harmful(&selection.traces) } else { Some((last, without, with)) };
+        let failed = if helps {
+            let harmful = unseen.harmful(&selection.traces, held.rms_after_N);
+            harmful.map(|(place, without)| (place, without, held.rms_after_N))
+        } else {
+            Some((last, without, with))
+        };
         let Some((place, without, with)) = failed else { return (selection, harmful, Some(held)) };
         if place != last {
             harmful = harmful.or(Some(selection.selected[place].fit.candidate));

@@ -282,16 +282,12 @@ impl HeldOutRows {
         (without, with, with < HELD_OUT_LEAVES * without && (tested || is_lower(&before, &after)))
     }
 
-    /// The last effect, but for the very last, without which the others predict held-out rows better; with the errors without it and with
-    /// it, N.
-    pub(super) fn harmful(&self, traces: &[Vec<f64>]) -> Option<(usize, f64, f64)> {
-        let others = traces.len().saturating_sub(1);
-        let with = if others > 0 { self.error(traces) } else { return None };
-        (0..others).rev().find_map(|place| {
-            let left: Vec<Vec<f64>> =
-                traces.iter().enumerate().filter(|(i, _)| *i != place).map(|(_, t)| t.clone()).collect();
-            let without = self.error(&left);
-            (without < with).then_some((place, without, with))
+    /// The last effect, but for the very last, without which the others predict held-out rows better than all together, whose error is
+    /// `with`, N; and the error without it, N.
+    pub(super) fn harmful(&self, traces: &[Vec<f64>], with: f64) -> Option<(usize, f64)> {
+        (0..traces.len().saturating_sub(1)).rev().find_map(|place| {
+            let without = self.error(&[&traces[..place], &traces[place + 1..]].concat());
+            (without < with).then_some((place, without))
         })
     }
 
@@ -395,10 +391,12 @@ mod tests {
         let extra = |i: usize| founded[i] + if rows.recording[i] == 0 { by_chance[i] } else { 0.0 };
         let shifted = rows.with_force((0..rows.len()).map(|i| rows.force[i] + extra(i)).collect());
         let held = HeldOutRows::new(&shifted, Kind::Stiff, &[]);
-        let (place, without, with) =
-            held.harmful(&[by_chance.clone(), founded.clone()]).expect("the first one does harm");
+        let harmful = |traces: &[Vec<f64>]| held.harmful(traces, held.error(traces));
+        let harm = [by_chance.clone(), founded.clone()];
+        let (place, without) = harmful(&harm).expect("the first one does harm");
+        let with = held.error(&harm);
         assert!(place == 0 && without < with, "{place}: {without} N without it, {with} N with it");
-        assert_eq!(held.harmful(&[founded.clone(), by_chance]), None, "the first one helps");
-        assert_eq!(held.harmful(&[founded]), None, "one effect is the last one");
+        assert_eq!(harmful(&[founded.clone(), by_chance]), None, "the first one helps");
+        assert_eq!(harmful(&[founded]), None, "one effect is the last one");
     }
 }
