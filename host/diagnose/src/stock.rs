@@ -2,7 +2,11 @@
 //!
 //! The numbers are those of the joint fit ([`pam_fit::stock`]). A law between muscles is named where it predicts left-out muscles better than
 //! chance differences do, and where its parameter exceeds its standard error by the quantile of Student's t. There are as many degrees of freedom
-//! as muscles less two. Unit of uncertainty: muscle.
+//! as muscles less two. Unit of uncertainty: muscle. Mounted lengths are named by `mounted_lengths`.
+
+mod mounted_lengths;
+#[cfg(test)]
+mod tests;
 
 use model_core::braid::Braid;
 use model_core::units::Length;
@@ -14,6 +18,7 @@ use crate::criteria::stock::{EXCHANGEABLE, ONSET, ONSET_STEPS, PLACES, SLOPE_RAN
 use crate::criteria::uncertainty::NORMAL_95;
 use crate::history::answer::{Estimate, FindingKind};
 use crate::history::history;
+pub use mounted_lengths::{CauseError, MountedLengths, MuscleMountings};
 
 /// An estimate with its standard error and its 95 % interval, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +119,8 @@ pub struct StockDiagnosis {
     pub confusable_with: Vec<String>,
     /// All laws that were tried.
     pub considered: Vec<Considered>,
+    /// The held mountings, each predicted from all others; `None` where none can be.
+    pub mounted_lengths: Option<MountedLengths>,
     /// First-run deficit pooled over the mountings of all muscles, N, with the number of muscles; `None` where none shows it.
     pub run_in: Option<(Interval, usize)>,
     /// The joint fit.
@@ -147,6 +154,7 @@ pub fn diagnose_stock(members: &[Member<'_>]) -> Result<StockDiagnosis> {
         named,
         confusable_with,
         considered,
+        mounted_lengths: mounted_lengths::mounted_lengths(&fitted),
         run_in,
         fitted,
     })

@@ -16,6 +16,7 @@
 //! | the shared force | `surface` |
 //! | Gauss–Newton steps, and the variances of the random effects | `mixed_model` |
 //! | each muscle predicted from the others; intervals over muscles | `between` |
+//! | each held mounting predicted from all others, and what it has of its own | `unseen_mountings` |
 //! | constants | [`criteria`] |
 //!
 //! Linear mixed model and its equations: C. R. Henderson, Biometrics 31 (1975) 423, doi 10.2307/2529430; variances by expectation and maximisation:
@@ -30,10 +31,12 @@ mod mixed_model;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod unseen_mountings;
 
 pub use between::{LawError, Stock, stock};
 pub use cells::{Cell, Mounted, StockCells, stock_cells};
 pub use mixed_model::fit;
+pub use unseen_mountings::{MountingCause, UnseenMounting, unseen_mountings};
 
 use self::surface::Surface;
 

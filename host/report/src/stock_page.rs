@@ -1,8 +1,9 @@
 //! The report of a stock: how the muscles differ with their length, what they share, and what each has of its own.
 
 use pam_diagnose::stock::StockDiagnosis;
-use pam_fit::stock::Law;
+use pam_fit::stock::{Law, MountingCause};
 
+use super::stock_mountings;
 use super::stock_text::{headline, law};
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
 
@@ -16,7 +17,8 @@ const CURVES: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
 pub fn page(answer: &StockDiagnosis) -> Page {
     let names: Vec<&str> = answer.muscles.iter().map(|m| m.name.as_str()).collect();
     let mut page = Page::new("Muscles of one stock", names.join(", "));
-    let tone = if answer.named.is_some() { Tone::Caution } else { Tone::Good };
+    let lengths_named = answer.mounted_lengths.as_ref().filter(|l| l.named());
+    let tone = if answer.named.is_some() || lengths_named.is_some() { Tone::Caution } else { Tone::Good };
     page.verdict(tone, headline(answer));
     if let Some((of, value, _)) = &answer.named {
         let (_, scale, unit) = law(Some(*of));
@@ -27,11 +29,22 @@ pub fn page(answer: &StockDiagnosis) -> Page {
             Tone::Plain,
         );
     }
+    if let Some(lengths) = lengths_named {
+        page.fact(
+            MountingCause::Length.effect().info().name,
+            format!("{} mm", fixed(1e3 * lengths.size.value, 1)),
+            "rms over the mountings",
+            Tone::Plain,
+        );
+    }
     page.fact("muscles", answer.muscles.len().to_string(), "fitted together", Tone::Plain);
     page.push(lengths(answer));
     page.push(shared(answer));
     page.push(own(answer));
     page.push(laws(answer));
+    if let Some(lengths) = &answer.mounted_lengths {
+        page.push(stock_mountings::section(answer, lengths));
+    }
     page
 }
 

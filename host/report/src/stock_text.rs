@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use pam_diagnose::stock::{Interval, StockDiagnosis};
 use pam_fit::stock::Law;
 
+use super::stock_mountings;
+
 /// The description of a law between muscles, with the factor and the unit of its parameter.
 pub(crate) fn law(of: Option<Law>) -> (&'static str, f64, &'static str) {
     match of {
@@ -19,9 +21,14 @@ fn plus_minus(of: &Interval, scale: f64, decimals: usize) -> String {
     format!("{:.decimals$} ± {:.decimals$}", scale * of.value, scale * 0.5 * (of.high - of.low))
 }
 
-/// The first sentence of the answer.
+/// The first sentences of the answer: the effect between muscles, then the mounted lengths.
 #[must_use]
 pub(crate) fn headline(answer: &StockDiagnosis) -> String {
+    let between = between_muscles(answer);
+    stock_mountings::headline(answer).map_or(between.clone(), |lengths| format!("{between} {lengths}"))
+}
+
+fn between_muscles(answer: &StockDiagnosis) -> String {
     let count = answer.muscles.len();
     match &answer.named {
         None => format!("The {count} muscles differ by chance only: no effect of their length is named."),
@@ -45,7 +52,11 @@ pub(crate) fn headline(answer: &StockDiagnosis) -> String {
 /// The whole answer.
 #[must_use]
 pub fn text(answer: &StockDiagnosis) -> String {
-    let mut text = headline(answer) + "\n\nWhat the muscles share\n";
+    let mut text = between_muscles(answer);
+    if let Some(lengths) = stock_mountings::headline(answer) {
+        text = format!("{text}\n{lengths}");
+    }
+    text += "\n\nWhat the muscles share\n";
     let _ = writeln!(
         text,
         "  pulling area at rest length: {:.1} mm² ({:.1} mm² by the described braid)",
@@ -85,6 +96,7 @@ pub fn text(answer: &StockDiagnosis) -> String {
             list(&|k| k.zero.value)
         );
     }
+    text += &answer.mounted_lengths.as_ref().map_or_else(String::new, stock_mountings::text);
     text += "\nLaws between muscles, with the error on muscles that were left out\n";
     for c in &answer.considered {
         let (words, scale, unit) = law(c.law);

@@ -3,8 +3,10 @@
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
-use pam_diagnose::stock::{Considered, Interval, MuscleOwn, SharedPlace, StockDiagnosis};
-use pam_fit::stock::Law;
+use pam_diagnose::stock::{
+    CauseError, Considered, Interval, MountedLengths, MuscleMountings, MuscleOwn, SharedPlace, StockDiagnosis,
+};
+use pam_fit::stock::{Law, MountingCause};
 use serde::Serialize;
 
 /// What muscles of one stock share, and what each has of its own.
@@ -12,9 +14,10 @@ use serde::Serialize;
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields, title = "pam-diagnose-stock/1"))]
 pub(crate) struct StockDocument {
     pub schema: &'static str,
-    /// `explained`: an effect that differs with length is named. `consistent`: the muscles differ by chance only.
+    /// `explained`: an effect that differs with length, or errors of the mounted lengths, are named. `consistent`: the muscles and mountings
+    /// differ by chance only.
     pub verdict: &'static str,
-    /// The effect that is named; empty where none is.
+    /// The effects that are named.
     pub missing: Vec<Named>,
     pub shared: Shared,
     pub muscles: Vec<Muscle>,
@@ -22,6 +25,8 @@ pub(crate) struct StockDocument {
     pub deviations: Deviations,
     /// All laws between muscles that were tried.
     pub considered: Vec<Tried>,
+    /// Held mountings, each predicted without its own recordings; null where none can be.
+    pub unseen_mountings: Option<UnseenMountings>,
     /// Root mean square of the residuals of the joint fit, N.
     pub rms_N: f64,
 }
@@ -44,7 +49,8 @@ pub(crate) struct Named {
     pub effect: &'static str,
     pub law: &'static str,
     pub parameter: Estimate,
-    /// The parameter over its standard error; unit of uncertainty: muscle.
+    /// The parameter over its standard error; unit of uncertainty: muscle. Of the mounted lengths: the mean gain in error of left-out mountings
+    /// over its standard error; unit of uncertainty: mounting.
     pub t: f64,
     pub confusable_with: Vec<String>,
     /// Whether it is the bench's, and no property of the muscles.
@@ -91,6 +97,43 @@ pub(crate) struct Muscle {
     pub mountings: Vec<Mounting>,
     /// How much less the first filling of a mounting pulls than the second.
     pub first_run_low: Option<Estimate>,
+    /// Its held mountings, each predicted without its own recordings; null where none can be.
+    pub unseen_mountings: Option<OwnMountings>,
+}
+
+/// Errors on the mountings of a muscle that were left out, rms.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct OwnMountings {
+    /// Predicted from all others.
+    pub error_N: f64,
+    /// With one length for each mounting, fitted to the other direction.
+    pub with_length_N: f64,
+}
+
+/// Mountings that were left out, and what one number for each would explain.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct UnseenMountings {
+    pub mountings: usize,
+    /// Root mean square error, predicted from all others.
+    pub error_N: f64,
+    /// The same with one number for each mounting, fitted to the other direction.
+    pub causes: Vec<Cause>,
+    /// Empty where `displacement-offset` is named.
+    pub why_not: String,
+}
+
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+pub(crate) struct Cause {
+    pub effect: &'static str,
+    pub error_N: f64,
+    /// Root mean square of the numbers.
+    pub size: f64,
+    /// Whether instruments may have numbers of this size.
+    pub plausible: bool,
+    pub unit: &'static str,
 }
 
 #[derive(Debug, Serialize)]
@@ -144,7 +187,43 @@ fn law(of: Option<Law>) -> (&'static str, f64, &'static str) {
     }
 }
 
-fn muscle(of: &MuscleOwn) -> Muscle {
+fn mountings(of: &MountedLengths) -> UnseenMountings {
+    let cause = |c: &CauseError| {
+        let (scale, unit) = match c.cause {
+            MountingCause::Length => (1e3, "mm"),
+            MountingCause::ForceZero => (1.0, "N"),
+            MountingCause::GaugeZero => (1e-3, "kPa"),
+            MountingCause::ForceScale => (1.0, ""),
+        };
+        Cause {
+            effect: c.cause.effect().info().name,
+            error_N: c.error,
+            size: scale * c.size,
+            plausible: c.plausible,
+            unit,
+        }
+    };
+    UnseenMountings {
+        mountings: of.mountings,
+        error_N: of.before,
+        causes: of.causes.iter().map(cause).collect(),
+        why_not: of.why_not.clone(),
+    }
+}
+
+/// The entry of the mounted lengths, where they are named.
+fn lengths(of: &MountedLengths) -> Option<Named> {
+    of.named().then(|| Named {
+        effect: MountingCause::Length.effect().info().name,
+        law: "x = x_read + d, each mounting its own d; rms of d",
+        parameter: estimate(&of.size, 1e3, "mm"),
+        t: of.t,
+        confusable_with: of.confusable_with.iter().map(|&e| e.to_owned()).collect(),
+        correction: true,
+    })
+}
+
+fn muscle(of: &MuscleOwn, mountings: Option<MuscleMountings>) -> Muscle {
     let history = |e: &pam_diagnose::history::answer::Estimate| Estimate {
         value: e.value,
         std: e.half().unwrap_or(0.0) / 1.96,
@@ -169,6 +248,7 @@ fn muscle(of: &MuscleOwn) -> Muscle {
             })
             .collect(),
         first_run_low: of.run_in.as_ref().map(history),
+        unseen_mountings: mountings.map(|m| OwnMountings { error_N: m.before, with_length_N: m.with_length }),
     }
 }
 
@@ -207,10 +287,13 @@ pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
             correction: *of == Law::Compliance,
         }
     });
+    let held = answer.mounted_lengths.as_ref();
+    let missing: Vec<Named> = named.into_iter().chain(held.and_then(lengths)).collect();
+    let own = |m: usize| held.and_then(|h| h.muscles.get(m).copied().flatten());
     StockDocument {
         schema: "pam-diagnose-stock/1",
-        verdict: if named.is_some() { "explained" } else { "consistent" },
-        missing: named.into_iter().collect(),
+        verdict: if missing.is_empty() { "consistent" } else { "explained" },
+        missing,
         shared: Shared {
             pressure_kPa: answer.pressure * 1e-3,
             pulling_area_mm2: answer.area * 1e6,
@@ -218,7 +301,7 @@ pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
             places: answer.shared.iter().map(place).collect(),
             first_run_low: answer.run_in.as_ref().map(|(i, _)| estimate(i, 1.0, "N")),
         },
-        muscles: answer.muscles.iter().map(muscle).collect(),
+        muscles: answer.muscles.iter().enumerate().map(|(m, of)| muscle(of, own(m))).collect(),
         deviations: Deviations {
             scale_pct: 100.0 * deviations.scale,
             rest_length_mm: 1e3 * deviations.length,
@@ -226,6 +309,7 @@ pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
             load_cell_zero_N: deviations.zero,
         },
         considered: answer.considered.iter().map(tried).collect(),
+        unseen_mountings: held.map(mountings),
         rms_N: answer.fitted.fit.rms,
     }
 }

@@ -38,7 +38,7 @@ fn real(year: &str, names: &[&str]) -> Option<Vec<(MuscleDescription, Campaign)>
 /// The blocked force of these muscles grows with their length. By the slopes of the force over pressure alone, 18.7 ± 3.1 and 16.9 ± 2.7 mm of them
 /// do not pull (festo.md).
 #[test]
-fn ends_of_real_muscles_come_out_of_both_sets() {
+fn ends_and_mounted_lengths_of_real_muscles_come_out_of_both_sets() {
     let sets: [(&str, &[&str]); 2] = [
         ("2022", &["83mm", "132mm", "182mm", "233mm", "281mm", "382mm"]),
         ("2021", &["13cm", "23cm", "27cm", "29cm", "30cm"]),
@@ -54,5 +54,11 @@ fn ends_of_real_muscles_come_out_of_both_sets() {
         // Six lengths suffice to name it; five, of which one alone is short, do not quite.
         let named = found.named.map(|n| n.0);
         assert_eq!(named, (year == "2022").then_some(Law::Ends), "{year}: {:#?}", found.considered);
+        // The lengths were set by tape measure, to within a millimetre.
+        let lengths = found.mounted_lengths.unwrap();
+        assert!(lengths.named() && (0.7e-3..1.6e-3).contains(&lengths.size.value), "{year}: {lengths:#?}");
+        for own in lengths.muscles.iter().flatten() {
+            assert!(own.with_length < 0.65 * own.before, "{year}: {own:?}");
+        }
     }
 }

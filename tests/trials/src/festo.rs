@@ -188,8 +188,8 @@ const COMPARISON: &str = "### Comparison with the published description\n\n\"Nam
     effect is possible at more than 1 % of the blocked force. \"Measured\": a finding of the report measures it, its interval excludes none, \
     and a named effect is its cause. The published description calls most of the run-in a creep that does not recover between runs, so \
     log-creep agrees with it. It gives no cause of the gap. There log-creep counts where it is named and a finding measures the gap and shows \
-    that memory to be the cause; \"In a set\" counts friction that unseen runs do not exclude in its place, too. The end effect shows in a \
-    stock of several lengths only, see the last section.\n\n\
+    that memory to be the cause; \"In a set\" counts friction that unseen runs do not exclude in its place, too. The end effect and \
+    errors of the mounted lengths show in a stock of several muscles, see [Muscles of one stock](stock.md).\n\n\
     | published | effects that agree | named | in a set | measured, with its cause | located there | could be hidden |\n";
 
 /// Section on held-out recordings, and the head of its table.

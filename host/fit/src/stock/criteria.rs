@@ -54,5 +54,7 @@ pub const FEWEST_MUSCLES: usize = 3;
 
 /// Step over which the slope of the force by the stroke is taken, m: well below the errors of a length.
 pub const SLOPE_STEP: f64 = 1e-4;
+/// Steps of Gauss and Newton for the one number of a mounting that was left out.
+pub const NUMBER_STEPS: usize = 8;
 /// Mean size of a normal value in standard deviations: sqrt(2/π).
 pub const MEAN_SIZE: f64 = 0.797_884_560_802_865_4;

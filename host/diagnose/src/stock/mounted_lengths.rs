@@ -1,0 +1,198 @@
+//! Whether the mounted lengths differ from those that were read.
+//!
+//! Each held mounting is predicted without its own recordings ([`unseen_mountings`]). The lengths are named where one length for each mounting
+//! removes most of the squared error, beyond the scatter between mountings, and no other number does so better. Unit of uncertainty: mounting.
+
+use pam_fit::numerics::student::{half_width, half_width_95};
+use pam_fit::stock::{MountingCause, Stock, UnseenMounting, Value, unseen_mountings};
+
+use super::Interval;
+use crate::criteria::judgement::RELEVANT_SIZE;
+use crate::criteria::stock::{FEWEST_MOUNTINGS, GAUGE_ZERO, LENGTH_ALPHA, LENGTH_GAIN, LENGTH_TREND};
+
+/// Errors of left-out mountings where each has one number of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CauseError {
+    /// What the number is.
+    pub cause: MountingCause,
+    /// Root mean square error, N.
+    pub error: f64,
+    /// Root mean square of the numbers: m, N, Pa, or a share.
+    pub size: f64,
+    /// Whether instruments may have numbers of this size.
+    pub plausible: bool,
+}
+
+/// Errors of the left-out mountings of one muscle, rms, N.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MuscleMountings {
+    /// As predicted from all others.
+    pub before: f64,
+    /// With one length for each mounting.
+    pub with_length: f64,
+}
+
+/// The held mountings of a stock, each predicted without its own recordings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MountedLengths {
+    /// How many mountings.
+    pub mountings: usize,
+    /// Root mean square error, N.
+    pub before: f64,
+    /// The same with one number for each mounting, by cause.
+    pub causes: Vec<CauseError>,
+    /// Root mean square of the errors of the lengths, m.
+    pub size: Interval,
+    /// By how much the lengths lower the error of a mounting, over its standard error.
+    pub t: f64,
+    /// Effects that predict the mountings as well.
+    pub confusable_with: Vec<&'static str>,
+    /// Why the lengths are not named, as text; empty where they are.
+    pub why_not: String,
+    /// By muscle; `None` for one without a mounting that was predicted.
+    pub muscles: Vec<Option<MuscleMountings>>,
+}
+
+impl MountedLengths {
+    /// Whether the lengths are named.
+    #[must_use]
+    pub fn named(&self) -> bool {
+        self.why_not.is_empty()
+    }
+
+    /// The errors with one number for each mounting.
+    #[must_use]
+    pub fn with(&self, cause: MountingCause) -> Option<&CauseError> {
+        self.causes.iter().find(|c| c.cause == cause)
+    }
+}
+
+/// The position of a cause among the errors of a mounting.
+const LENGTH: usize = 0;
+
+/// The lengths of a stock; `None` where no held mounting can be predicted from others.
+pub(super) fn mounted_lengths(fitted: &Stock) -> Option<MountedLengths> {
+    let all = unseen_mountings(&fitted.cells, &fitted.laws, &fitted.fit);
+    let count = all.len();
+    if count == 0 {
+        return None;
+    }
+    let mean = |of: &dyn Fn(&UnseenMounting) -> f64| all.iter().map(of).sum::<f64>() / count as f64;
+    let scales = Scales::of(fitted);
+    let causes: Vec<CauseError> = MountingCause::ALL
+        .iter()
+        .enumerate()
+        .map(|(k, cause)| {
+            let size = mean(&|u| u.number[k].powi(2)).sqrt();
+            let plausible = *cause != MountingCause::GaugeZero || size <= GAUGE_ZERO * scales.highest;
+            CauseError { cause: *cause, error: mean(&|u| u.with[k]).sqrt(), size, plausible }
+        })
+        .collect();
+    let relative = |of: &dyn Fn(&UnseenMounting) -> f64| {
+        all.iter().map(|u| of(u).sqrt() / scales.largest[u.member]).collect::<Vec<f64>>()
+    };
+    let before = relative(&|u| u.square);
+    let with: Vec<Vec<f64>> = (0..causes.len()).map(|k| relative(&|u| u.with[k])).collect();
+    let left = sum_of_squares(&with[LENGTH]) / sum_of_squares(&before);
+    let t = gain(&before, &with[LENGTH]);
+    let enough = half_width(LENGTH_ALPHA, count as f64 - 1.0);
+    let quantile = half_width_95(count.saturating_sub(1));
+    let better = |k: usize| gain(&with[LENGTH], &with[k]) > quantile;
+    let worse = |k: usize| gain(&with[k], &with[LENGTH]) > quantile;
+    let others = || (1..causes.len()).filter(|k| causes[*k].plausible);
+    let size = causes[LENGTH].size;
+    let std = size / (2.0 * count as f64).sqrt();
+    let why_not = if count < FEWEST_MOUNTINGS {
+        format!("{count} mountings can be predicted from others; {FEWEST_MOUNTINGS} are needed")
+    } else if !(sum_of_squares(&before) >= count as f64 * RELEVANT_SIZE.powi(2)) {
+        format!("mountings are predicted to within {:.0} % of the largest force", 100.0 * RELEVANT_SIZE)
+    } else if !(left <= 1.0 - LENGTH_GAIN && t > enough) {
+        format!(
+            "a length for each mounting leaves {:.0} % of the squared error ({t:.1} standard errors over mountings; {enough:.1} are needed)",
+            100.0 * left
+        )
+    } else if let Some(k) = others().find(|k| better(*k)) {
+        format!("{} predicts the mountings better", causes[k].cause.effect().info().name)
+    } else if follow_contraction(&all, fitted) {
+        "the lengths follow the contraction: the muscles differ, in their braid angle for example, not their mountings".to_owned()
+    } else {
+        String::new()
+    };
+    let confusable = others().filter(|k| !worse(*k));
+    Some(MountedLengths {
+        mountings: count,
+        before: mean(&|u| u.square).sqrt(),
+        size: Interval::new(Value { value: size, std }, quantile),
+        t,
+        confusable_with: confusable.map(|k| causes[k].cause.effect().info().name).collect(),
+        why_not,
+        muscles: (0..fitted.cells.mountings.len()).map(|m| of_muscle(&all, m)).collect(),
+        causes,
+    })
+}
+
+/// What errors are compared with.
+struct Scales {
+    /// Largest force of each muscle, N.
+    largest: Vec<f64>,
+    /// The highest pressure, Pa.
+    highest: f64,
+}
+
+impl Scales {
+    fn of(fitted: &Stock) -> Self {
+        let mut largest = vec![f64::MIN_POSITIVE; fitted.cells.mountings.len()];
+        fitted.cells.list.iter().for_each(|c| largest[c.member] = largest[c.member].max(c.force));
+        let highest = fitted.cells.list.iter().map(|c| c.pressure).fold(0.0, f64::max);
+        Self { largest, highest }
+    }
+}
+
+fn sum_of_squares(of: &[f64]) -> f64 {
+    of.iter().map(|v| v * v).sum()
+}
+
+/// How many standard errors over the mountings the second errors lie below the first. Root mean squares of mountings are compared: in their
+/// squares one large error would outweigh all others.
+fn gain(before: &[f64], after: &[f64]) -> f64 {
+    let count = before.len() as f64;
+    let gains: Vec<f64> = before.iter().zip(after).map(|(b, a)| b - a).collect();
+    let mean = gains.iter().sum::<f64>() / count;
+    let square: f64 = gains.iter().map(|g| (g - mean).powi(2)).sum();
+    mean / (square / (count - 1.0) / count).sqrt().max(f64::MIN_POSITIVE)
+}
+
+fn of_muscle(all: &[UnseenMounting], m: usize) -> Option<MuscleMountings> {
+    let own: Vec<&UnseenMounting> = all.iter().filter(|u| u.member == m).collect();
+    let rms = |of: &dyn Fn(&UnseenMounting) -> f64| {
+        (own.iter().map(|u| of(u)).sum::<f64>() / own.len() as f64).sqrt()
+    };
+    (!own.is_empty())
+        .then(|| MuscleMountings { before: rms(&|u| u.square), with_length: rms(&|u| u.with[LENGTH]) })
+}
+
+/// Whether a straight line over the strokes of a muscle's other mountings predicts the lengths better than their mean does.
+fn follow_contraction(all: &[UnseenMounting], fitted: &Stock) -> bool {
+    let (mut by_mean, mut by_line) = (0.0, 0.0);
+    for m in 0..fitted.cells.mountings.len() {
+        let own: Vec<(f64, f64)> = all
+            .iter()
+            .filter(|u| u.member == m)
+            .filter_map(|u| Some((fitted.cells.mountings[m][u.mounting].stroke?, u.number[LENGTH])))
+            .collect();
+        // A line through two others is no test.
+        if own.len() < 4 {
+            continue;
+        }
+        for (k, (stroke, length)) in own.iter().enumerate() {
+            let others = || own.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, o)| *o);
+            let count = own.len() as f64 - 1.0;
+            let (x, y) = others().fold((0.0, 0.0), |s, o| (s.0 + o.0 / count, s.1 + o.1 / count));
+            let (xx, xy) =
+                others().fold((0.0, 0.0), |s, o| (s.0 + (o.0 - x).powi(2), s.1 + (o.0 - x) * (o.1 - y)));
+            by_mean += (length - y).powi(2);
+            by_line += (length - y - xy / xx.max(f64::MIN_POSITIVE) * (stroke - x)).powi(2);
+        }
+    }
+    by_line < (1.0 - LENGTH_TREND) * by_mean
+}
