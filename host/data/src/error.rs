@@ -253,6 +253,20 @@ impl Error {
         Self(Box::new(Inner { code: code.into(), cause: cause.into(), place: Place::default(), help: None }))
     }
 
+    /// The same failure, with what it concerns before its cause.
+    ///
+    /// ```
+    /// use pam_data::error::{DataCode, Error};
+    /// let error = Error::new(DataCode::RecordingTooShort, "two rows").line(3).concerning("campaign `May`");
+    /// assert_eq!(error.cause(), "campaign `May`: two rows");
+    /// assert_eq!(error.place().line, Some(3));
+    /// ```
+    #[must_use]
+    pub fn concerning(mut self, what: impl std::fmt::Display) -> Self {
+        self.0.cause = format!("{what}: {}", self.0.cause);
+        self
+    }
+
     /// The file could not be read; the operating system's reason becomes part of the cause.
     pub fn unreadable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
         let file = file.as_ref();

@@ -75,15 +75,7 @@ pub struct Timeline {
 }
 
 fn of_campaign(visit: &Visit, error: Error) -> Error {
-    let with_campaign = Error::new(error.code(), format!("campaign `{}`: {}", visit.name, error.cause()));
-    let with_campaign = match error.advice() {
-        Some(help) => with_campaign.help(help),
-        None => with_campaign,
-    };
-    match &error.place().file {
-        Some(file) => with_campaign.file(file),
-        None => with_campaign,
-    }
+    error.concerning(format_args!("campaign `{}`", visit.name))
 }
 
 /// Follows an actuator through its campaigns, which are in the order of their dates.

@@ -288,6 +288,11 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// The effects that these recordings could hide at a size that matters, and that no check of the bench has excluded.
+    pub fn could_hide(&self) -> impl Iterator<Item = &Considered> {
+        self.considered.iter().filter(|c| !c.checked && c.could_be_hidden(self.blocked_force_N))
+    }
+
     /// Whether there was anything to judge.
     #[must_use]
     pub fn judged(&self) -> bool {

@@ -2,6 +2,7 @@
 
 mod history;
 mod located;
+mod open_questions;
 
 use model_core::braid::Geometry;
 use model_core::units::Length;
@@ -13,7 +14,7 @@ use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
-use pam_diagnose::verdict::{Diagnosis, Missing, Pattern, Verdict};
+use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
 use pam_fit::RecordingResidual;
 use pam_fit::bench::Candidate;
 
@@ -50,9 +51,9 @@ pub fn page_with_residuals(
     page.push(alternatives(d));
     page.push(controller(d, geometry));
     page.push(unseen(d));
-    page.push(remains(d));
-    page.push(next(d));
-    page.push(looked_at(d));
+    page.push(open_questions::remains(d));
+    page.push(open_questions::next(d));
+    page.push(open_questions::considered(d));
     page.recordings(campaign);
     page.origin("made by", format!("host {}", env!("CARGO_PKG_VERSION")));
     page
@@ -371,91 +372,5 @@ fn unseen(d: &Diagnosis) -> Section {
             "The effects do not reduce the error on held-out rows. Do not use a table with them.",
         );
     }
-    section
-}
-
-fn remains(d: &Diagnosis) -> Section {
-    let mut section = Section::new("Unexplained").summarised();
-    if d.verdict() != Verdict::Consistent {
-        section.text(format!(
-            "{} % of the excess error is unexplained{}.",
-            fixed(100.0 * d.unexplained.share, 0),
-            match &d.unexplained.pattern {
-                Pattern::None => ", without a pattern".to_owned(),
-                pattern => format!(". Its pattern: {}", wording::pattern(pattern)),
-            }
-        ));
-    }
-    if !d.judged() {
-        return section;
-    }
-    let hidden: Vec<String> = d
-        .considered
-        .iter()
-        .filter(|c| !c.checked && c.could_be_hidden(d.blocked_force_N))
-        .map(|c| match c.hidden_up_to_N {
-            Some(h) => format!("`{}` up to {} N", c.effect, figures(h, 2)),
-            None => format!("`{}` of any size", c.effect),
-        })
-        .collect();
-    if !hidden.is_empty() {
-        section.text(format!(
-            "These recordings could hide these effects, because the tables imitate them or nothing excites them: {}.",
-            hidden.join(", ")
-        ));
-    }
-    section
-}
-
-fn next(d: &Diagnosis) -> Section {
-    let mut section = Section::new("Next experiment").summarised();
-    if let Some(n) = &d.next_experiment {
-        let separates: Vec<String> = n.separates.iter().map(|s| format!("`{s}`")).collect();
-        section.text(format!(
-            "{} It separates {} by up to {} N.",
-            wording::sentence(&wording::proposal(&n.proposal)),
-            separates.join(" and "),
-            figures(n.expected_difference_N, 2)
-        ));
-        if !n.protocol.is_empty() {
-            section.listing(n.protocol.clone());
-        }
-    } else if d.judged() && d.verdict() == Verdict::Consistent {
-        section.text("None needed for the range that these recordings cover.");
-    }
-    section
-}
-
-fn looked_at(d: &Diagnosis) -> Section {
-    let mut section = Section::new("All effects considered");
-    if !d.judged() {
-        return section;
-    }
-    if !d.path.is_empty() {
-        let mut table = Table::new(
-            "Forward selection",
-            &["selected", "residual after it (N)", "held-out error after it (N)", "p (chance)", "next best"],
-        );
-        for step in &d.path {
-            let competitors: Vec<String> =
-                step.runners_up.iter().take(3).map(|(name, _)| format!("`{name}`")).collect();
-            table.row([
-                format!("`{}`", step.effect),
-                figures(step.rms_N, 3),
-                step.held_out_rms_N.map_or_else(|| "–".to_owned(), |e| figures(e, 3)),
-                figures(step.p, 2),
-                competitors.join(", "),
-            ]);
-        }
-        section.table(table);
-    }
-    let named = |effect: &str| d.missing.iter().any(|m| m.effect == effect);
-    let mut considered: Vec<_> = d.considered.iter().filter(|c| !named(&c.effect)).collect();
-    considered.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut table = Table::new("Effects not named", &["effect", "share explained alone (%)", "reason"]);
-    for c in considered {
-        table.row([format!("`{}`", c.effect), fixed(100.0 * c.gain, 1), wording::why_not(c)]);
-    }
-    section.table(table);
     section
 }

@@ -3,6 +3,7 @@
 pub mod change;
 mod experiment;
 mod headline;
+mod hidden;
 mod outcome;
 mod region;
 mod remark;
@@ -14,6 +15,7 @@ mod why;
 mod why_not;
 
 pub use experiment::{measure, proposal};
+pub(crate) use hidden::{HiddenEffect, hidden};
 pub use outcome::{one_bladder_misfits, pattern, split, verdict};
 pub use region::region;
 pub use remark::{remark, reserve};

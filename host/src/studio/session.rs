@@ -155,8 +155,7 @@ impl Session<'_> {
     fn replace(&mut self, fresh: Connected) -> Result<Answer> {
         if let Some(present) = &mut self.connected {
             present.release().map_err(|e| {
-                Error::new(e.code(), format!("the present controller stays connected: {}", e.cause()))
-                    .help("vent it, or disconnect it first")
+                e.concerning("the present controller stays connected").help("vent it, or disconnect it first")
             })?;
         }
         self.close()?;

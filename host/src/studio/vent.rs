@@ -50,7 +50,7 @@ impl Vent {
                 .help("connect to a port, or start an emulated one")
         })?;
         line.send().map_err(|e| {
-            Error::new(e.code(), format!("the request to vent cannot be sent: {}", e.cause()))
+            e.concerning("the request to vent cannot be sent")
                 .help("shut off the air supply of the muscle by hand")
         })
     }

@@ -81,7 +81,7 @@ struct FirstLine<'a> {
 
 impl<'a> FirstLine<'a> {
     fn find(text: &'a [u8], import: &Import) -> Result<Self> {
-        let comment = import.comment.and_then(|c| u8::try_from(c).ok());
+        let comment = import.comment_byte();
         let (mut start, mut number) = (0, 1);
         let (mut stated_delimiter, mut remark): (_, &[u8]) = (None, &[]);
         loop {
@@ -120,7 +120,7 @@ impl<'a> FirstLine<'a> {
         let commas = delimiter != b',' && thousands != Some(b',') && has_decimal_commas(row, delimiter);
         Ok(Dialect {
             delimiter,
-            comment: import.comment.and_then(|c| u8::try_from(c).ok()),
+            comment: import.comment_byte(),
             decimal_comma: import.decimal == Decimal::Comma || commas,
             thousands,
             skip_missing: import.missing == Missing::Skip,

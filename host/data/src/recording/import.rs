@@ -258,6 +258,11 @@ impl Import {
         })
     }
 
+    /// The character that begins a remark; `None` for one that is no single byte.
+    pub(super) fn comment_byte(&self) -> Option<u8> {
+        self.comment.and_then(|c| u8::try_from(c).ok())
+    }
+
     pub(super) fn delimiter(&self) -> Result<Option<u8>> {
         Ok(match self.delimiter.as_deref() {
             None => None,

@@ -2,16 +2,13 @@
 
 use std::fmt::Write;
 
-use pam_diagnose::experiment::what_would_show;
 use pam_diagnose::history::is_from_history;
-use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict};
 use pam_diagnose::why::Why;
 
-use super::experiment::needs_strokes;
 use super::{
-    HALF_95, measure, one_bladder_misfits, pattern, proposal, region, remark, sentence, split, why,
-    with_interval,
+    HALF_95, HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split,
+    why, with_interval,
 };
 use crate::effect_page::place;
 
@@ -178,40 +175,21 @@ pub fn traded_off(m: &Missing) -> Option<&'static str> {
 
 /// What may be there unseen, by what would show it; and what checks of the bench have excluded.
 fn could_be_hidden(s: &mut String, d: &Diagnosis) {
-    let held = d.remarks.contains(&Remark::HeldLength);
-    let mut moving = Vec::new();
-    let mut by_measure: Vec<(&str, Vec<String>)> = Vec::new();
-    for c in &d.considered {
-        if c.checked || !c.could_be_hidden(d.blocked_force_N) {
-            continue;
-        }
-        let size = match c.hidden_up_to_N {
-            Some(h) => format!("{} up to {h:.1} N", c.effect),
-            None => format!("{} of any size", c.effect),
-        };
-        let shown_by = what_would_show(&c.effect);
-        // Strokes are no advice for a muscle that is used at held lengths.
-        if held && needs_strokes(shown_by) {
-            moving.push(size);
-            continue;
-        }
-        let measure = measure(shown_by);
-        match by_measure.iter_mut().find(|m| m.0 == measure) {
-            Some(known) => known.1.push(size),
-            None => by_measure.push((measure, vec![size])),
-        }
-    }
-    if !by_measure.is_empty() {
+    let named = |effects: &[HiddenEffect<'_>]| {
+        effects.iter().map(|e| format!("{} {}", e.effect, e.size)).collect::<Vec<_>>().join(", ")
+    };
+    let hidden = hidden(d);
+    if !hidden.by_measure.is_empty() {
         let _ = writeln!(s, "\nEffects that these recordings could hide, and how to find out");
     }
-    for (measure, effects) in by_measure {
-        let _ = writeln!(s, "  {}: {measure}", effects.join(", "));
+    for (measure, effects) in &hidden.by_measure {
+        let _ = writeln!(s, "  {}: {measure}", named(effects));
     }
-    if !moving.is_empty() {
+    if !hidden.moving.is_empty() {
         let _ = writeln!(
             s,
             "\nEffects that only a moving muscle shows; they do not matter where its length is held\n  {}",
-            moving.join(", ")
+            named(&hidden.moving)
         );
     }
     let checked = d.considered.iter().filter(|c| c.checked);
