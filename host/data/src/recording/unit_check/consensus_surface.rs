@@ -20,8 +20,10 @@ const AGREES: f64 = 0.15;
 const CHANGES: f64 = 0.1;
 /// The others cover a stroke if one of their rows is nearer than this share of their range.
 const NEAR: f64 = 0.03;
-/// They cover a pressure up to this factor beyond their own range.
+/// They cover a pressure up to this factor beyond their own range…
 const BEYOND: f64 = 1.6;
+/// …and below it by this share of their range: by one of five even levels, over which force is linear in pressure.
+const BELOW: f64 = 0.3;
 /// The surface is trusted at a stroke where the recordings that it is fitted to are, in the median, nearer to it than this share of the
 /// usual largest force: half of what makes another recording inconsistent. A steep beginning of the stroke is more than it follows.
 const FOLLOWED: f64 = 0.5 * FAR_OFF;
@@ -52,6 +54,13 @@ pub(super) struct ConsensusSurface {
     largest: f64,
     /// Whether the surface follows the recordings in each part of the strokes' range.
     followed: Vec<bool>,
+}
+
+/// Residuals of the same rows of a recording, as shares of the usual largest force.
+#[derive(Clone, Copy)]
+struct Residuals {
+    as_read: f64,
+    corrected: f64,
 }
 
 /// A recording that agrees once a mistake is corrected.
@@ -127,10 +136,15 @@ impl ConsensusSurface {
         means.iter_mut().map(near).collect()
     }
 
+    /// Whether the surface follows the others at a stroke, or nothing is known there.
+    fn is_followed(&self, stroke: f64) -> bool {
+        let known = ((stroke - self.stroke.0) / self.stroke.1 - 0.5).abs() <= 0.5 + NEAR;
+        !known || self.followed[self.part(stroke)]
+    }
+
     /// The rows of a recording but those at strokes where the surface does not follow the others.
     fn comparable(&self, rows: &[Row]) -> Vec<Row> {
-        let known = |x: f64| ((x - self.stroke.0) / self.stroke.1 - 0.5).abs() <= 0.5 + NEAR;
-        rows.iter().copied().filter(|r| !known(r[1]) || self.followed[self.part(r[1])]).collect()
+        rows.iter().copied().filter(|r| self.is_followed(r[1])).collect()
     }
 
     fn fitted(&self, rows: &[Row]) -> Option<ForceSurface> {
@@ -152,26 +166,24 @@ impl ConsensusSurface {
     fn covers(&self, pressure: f64, stroke: f64) -> bool {
         let next = self.strokes.partition_point(|x| *x < stroke);
         let near = |i: usize| self.strokes.get(i).is_some_and(|x| (x - stroke).abs() <= NEAR * self.stroke.1);
-        let within = pressure <= BEYOND * self.pressure.1 && pressure >= self.pressure.0 / BEYOND;
+        let (low, high) = self.pressure;
+        let below = (low / BEYOND).min(low - BELOW * (high - low));
+        let within = pressure <= BEYOND * high && pressure >= below;
         within && (near(next) || next > 0 && near(next - 1))
     }
 
     /// Whether an inconsistent recording agrees once one mistake is corrected.
     pub(super) fn judge(&self, sample: &Sample) -> Option<Judged> {
-        let as_read = Some(self.residual(&sample.rows)).filter(|off| *off >= FAR_OFF)?;
-        let corrected = |m: Mistake| {
-            let rows: Vec<Row> = sample.rows.iter().map(|r| m.of_row(*r)).collect();
-            let comparable = self.comparable(&rows);
-            // The rows that are compared must be most of the recording.
-            (4 * comparable.len() >= 3 * rows.len()).then_some(())?;
-            Some((self.corrected_residual(&comparable)?, m))
-        };
-        let tried = mistakes(&sample.rows).filter_map(corrected);
-        let mut tried: Vec<(f64, Mistake)> = tried.collect();
-        tried.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let (left, mistake) = tried.first().copied()?;
-        let next = tried.get(1).filter(|(next, _)| *next < AS_GOOD * left);
-        (left <= AGREES && as_read >= BETTER * left).then(|| Judged {
+        if self.residual(&sample.rows) < FAR_OFF {
+            return None;
+        }
+        let mut tried: Vec<(Residuals, Mistake)> = mistakes(&sample.rows)
+            .filter_map(|m| Some((self.with_mistake_corrected(&sample.rows, m)?, m)))
+            .collect();
+        tried.sort_unstable_by(|a, b| a.0.corrected.total_cmp(&b.0.corrected));
+        let (Residuals { as_read, corrected: left }, mistake) = tried.first().copied()?;
+        let next = tried.get(1).filter(|(next, _)| next.corrected < AS_GOOD * left);
+        (left <= AGREES && as_read >= FAR_OFF.max(BETTER * left)).then(|| Judged {
             left,
             found: InconsistentRecording { recording: sample.recording, mistake, or: next.map(|(_, m)| *m) },
         })
@@ -198,13 +210,24 @@ impl ConsensusSurface {
         comparable.len() >= LEAST_ROWS && self.residual(&comparable) >= FAR_OFF
     }
 
-    /// The residual of rows with a mistake corrected: `None` where the others do not cover most of them, or where the expected force
-    /// hardly changes. A dead load cell agrees with any muscle without pressure, and one level agrees with many units.
-    fn corrected_residual(&self, rows: &[Row]) -> Option<f64> {
-        let known = rows.iter().filter(|r| self.covers(r[0], r[1])).count();
-        let mut made: Vec<f64> = rows.iter().map(|[p, x, _]| self.force(*p, *x).max(0.0)).collect();
+    /// The residuals of a recording where the others cover it with a mistake corrected: beyond their strokes and pressures, the surface says
+    /// nothing. `None` where they do not cover most of it, or where the expected force hardly changes. A dead load cell agrees with any
+    /// muscle without pressure, and one level agrees with many units.
+    fn with_mistake_corrected(&self, rows: &[Row], mistake: Mistake) -> Option<Residuals> {
+        let both = rows.iter().map(|r| (*r, mistake.of_row(*r)));
+        let comparable: Vec<(Row, Row)> = both.filter(|(_, c)| self.is_followed(c[1])).collect();
+        let covered = comparable.iter().copied().filter(|(_, c)| self.covers(c[0], c[1]));
+        let (as_read, corrected): (Vec<Row>, Vec<Row>) = covered.unzip();
+        if 4 * comparable.len() < 3 * rows.len()
+            || corrected.is_empty()
+            || 3 * corrected.len() < 2 * comparable.len()
+        {
+            return None;
+        }
+        let mut made: Vec<f64> = corrected.iter().map(|[p, x, _]| self.force(*p, *x).max(0.0)).collect();
         let changes = self.share(&mut made, 4) - self.share(&mut made, 1);
-        (!rows.is_empty() && 4 * known >= 3 * rows.len() && changes >= CHANGES).then(|| self.residual(rows))
+        (changes >= CHANGES)
+            .then(|| Residuals { as_read: self.residual(&as_read), corrected: self.residual(&corrected) })
     }
 
     /// The 80 % quantile of the mean residuals of a recording's sections, as a share of the usual largest force; a slack muscle has no

@@ -5,9 +5,14 @@ const PSI: f64 = 6.894_757;
 
 /// A loop at a pressure (Pa), of a muscle with a deadband of 60 kPa, a tenth of friction, and 0.1 m of rest length.
 fn loops(name: &str, pressure: f64) -> Recording {
+    loops_to(name, pressure, 0.02)
+}
+
+/// The same to a stroke, m.
+fn loops_to(name: &str, pressure: f64, furthest: f64) -> Recording {
     let rows = 240;
     let phase = |i: usize| (i as f64 / rows as f64 * 3.0).fract();
-    let stroke: Vec<f64> = (0..rows).map(|i| 0.02 * (1.0 - (1.0 - 2.0 * phase(i)).abs())).collect();
+    let stroke: Vec<f64> = (0..rows).map(|i| furthest * (1.0 - (1.0 - 2.0 * phase(i)).abs())).collect();
     let way = |i: usize| if phase(i) < 0.5 { 0.95 } else { 1.05 };
     let pull = |x: f64| ((pressure - 60e3) * 5e-4 * (1.0 - 20.0 * x).powi(2) - 400.0 * x).max(0.0);
     Recording {
@@ -84,6 +89,23 @@ fn signs_and_zeros_are_found() {
     );
     let absolute = spoiled(1, Column::Pressure, |p| p + ATMOSPHERE);
     assert_eq!(found(&absolute), [(1, other(Column::Pressure, MistakeKind::Absolute(ATMOSPHERE)))]);
+}
+
+/// The more pressure, the further a muscle contracts: beyond the strokes of the others, their surface says nothing.
+#[test]
+fn absolute_pressure_is_found_at_every_level() {
+    let campaign: Vec<Recording> = (0..6)
+        .map(|k| 150e3 + 80e3 * f64::from(k))
+        .map(|p| loops_to("loop", p, 0.008 + 0.012 * p / 550e3))
+        .collect();
+    assert_eq!(found(&campaign), []);
+    // The force at the lowest pressure hardly changes with the stroke.
+    for which in 1..campaign.len() {
+        let mut spoiled = campaign.clone();
+        spoiled[which].pressure.iter_mut().for_each(|p| *p += ATMOSPHERE);
+        let absolute = Mistake { column: Column::Pressure, wrong: MistakeKind::Absolute(ATMOSPHERE) };
+        assert_eq!(found(&spoiled), [(which, absolute)], "in {which}");
+    }
 }
 
 #[test]
