@@ -78,7 +78,8 @@ pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &
         }
     }
     m.push_str(
-        "\nNot in this study are limits of computing time and sizes of arrays. Loops of the virtual bench do not reach criteria of comparisons \
+        "\nDoubled, `TABLE_ORDER` exceeds the largest order of a table, and `KEPT_GAIN` exceeds one: no effect can be named then. \
+         Not in this study are limits of computing time and sizes of arrays. Loops of the virtual bench do not reach criteria of comparisons \
          with a reference, campaigns over months, isometric runs, and stocks. Nor do they reach those of proposed recordings and of a \
          table's health on a controller.\n",
     );
