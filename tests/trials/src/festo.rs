@@ -2,9 +2,11 @@
 //! answers are compared with the published description of the recordings, and its predictions with the laboratory's own formula.
 
 use crate::answer::{Answer, run_limited};
+use crate::festo_comparison::comparison;
 use crate::festo_history;
 use crate::festo_tables;
 use crate::queue::in_order;
+use crate::stock;
 use crate::tool;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Import, Reader};
@@ -43,74 +45,6 @@ const SETS: [Set; 2] = [
             ("29cm", "festo10_rest281mm_29cm"),
             ("30cm", "festo10_rest281mm_30cm"),
         ],
-    },
-];
-
-/// A statement of the published description, and the answers that agree with it.
-struct Published {
-    what: &'static str,
-    effects: &'static [&'static str],
-    /// Effects that agree where a finding of the report shows one of them to be the cause.
-    as_cause: &'static [&'static str],
-    /// The kinds of documented findings that are about it.
-    findings: &'static [&'static str],
-    regions: &'static [&'static str],
-    words: &'static [&'static str],
-}
-
-const PUBLISHED: [Published; 5] = [
-    Published {
-        what: "The first run of a mounting is low: the muscle runs in, and again whenever the mounting is changed",
-        effects: &[
-            "log-creep",
-            "mullins-softening",
-            "cyclic-softening",
-            "permanent-set",
-            "breakaway-friction",
-        ],
-        as_cause: &[],
-        findings: &["first-run-deficit"],
-        regions: &["recording", "cycle", "time"],
-        words: &[],
-    },
-    Published {
-        what: "At constant pressure and length the force creeps, and remembers earlier runs",
-        effects: &["stress-relaxation", "log-creep", "permanent-set"],
-        as_cause: &[],
-        findings: &["creep"],
-        regions: &["hold-time", "time"],
-        words: &["at rest", "creep"],
-    },
-    Published {
-        what: "A gap between filling and emptying that grows with contraction",
-        effects: &[
-            "friction-asymmetry",
-            "coulomb-friction",
-            "pressure-friction",
-            "seal-friction",
-            "presliding-hysteresis",
-            "minor-loop-memory",
-        ],
-        as_cause: &["log-creep"],
-        findings: &["filling-emptying-gap"],
-        regions: &["direction", "contraction"],
-        words: &[],
-    },
-    Published {
-        what: "Ends that are not cylinders: the blocked force grows with the muscle's length",
-        effects: &["tip-effect", "contact-loss", "braid-elasticity"],
-        as_cause: &[],
-        findings: &[],
-        regions: &[],
-        words: &["ends that are not"],
-    },
-    Published {
-        what: "Mounted lengths by tape measure, to within a millimetre",
-        effects: &["displacement-offset", "end-slip"],
-        as_cause: &[],
-        findings: &["slip"],
-        regions: &["contraction"],
-        words: &["mounting"],
     },
 ];
 
@@ -182,16 +116,6 @@ const HEAD: &str = "# Real recordings of a commercial muscle\n\nWritten by `carg
 /// Columns of the diagnoses of one form.
 const ANSWERS: &str = "| set, muscle | verdict | named (probability, share explained) | where | held-out rows before → after, N |\n";
 
-/// Paragraph on the published description, and the head of its table.
-const COMPARISON: &str = "### Comparison with the published description\n\n\"Named\": one of the listed effects is named. \"In a set\": such an \
-    effect is confusable with a named one. \"Located there\": the excess error is located on such a coordinate. \"Could be hidden\": such an \
-    effect is possible at more than 1 % of the blocked force. \"Measured\": a finding of the report measures it, its interval excludes none, \
-    and a named effect is its cause. The published description calls most of the run-in a creep that does not recover between runs, so \
-    log-creep agrees with it. It gives no cause of the gap. There log-creep counts where it is named and a finding measures the gap and shows \
-    that memory to be the cause; \"In a set\" counts friction that unseen runs do not exclude in its place, too. The end effect and \
-    errors of the mounted lengths show in a stock of several muscles, see [Muscles of one stock](stock.md).\n\n\
-    | published | effects that agree | named | in a set | measured, with its cause | located there | could be hidden |\n";
-
 /// Section on held-out recordings, and the head of its table.
 const HELD_OUT: &str = "## Held-out recordings\n\nMean error of the settled points, in percent of the blocked force at the highest pressure. Each \
     run, each contraction, and each length is predicted from all others (`host evaluate`). The laboratory's published formula is compared \
@@ -206,6 +130,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         .flat_map(|f| SETS.iter().flat_map(|s| s.muscles.iter().map(|m| (s.year, m.0, m.1, f.0))))
         .collect();
     let diagnosed = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
+    let stock = stock::answer_of_both_sets(data, output, host)?;
     let mut text = HEAD.to_owned();
     let _ = writeln!(text, "\n{}", tables_section(data)?.trim_end());
     let per_form = cases.len() / FORMS.len();
@@ -214,7 +139,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         for a in diagnosed {
             line(&mut text, a);
         }
-        comparison(&mut text, diagnosed);
+        comparison(&mut text, &answered(diagnosed), &stock);
     }
     let _ = writeln!(text, "\n{}", memory_section(&cases[per_form..], &diagnosed[per_form..]).trim_end());
     let _ = writeln!(text, "\n{HELD_OUT}| --- | --- | --- | --- | --- | --- |");
@@ -354,61 +279,9 @@ fn line(text: &mut String, diagnosed: &Diagnosed) {
     );
 }
 
-/// The published description, and the number of answers that agree with it.
-fn comparison(text: &mut String, diagnosed: &[Diagnosed]) {
-    let _ = writeln!(text, "\n{COMPARISON}| --- | --- | --- | --- | --- | --- | --- |");
-    let answers: Vec<(&str, &Answer, &Value)> = diagnosed
-        .iter()
-        .filter_map(|a| a.answer.as_ref().ok().map(|(x, v)| (a.label.as_str(), x, v)))
-        .collect();
-    for w in &PUBLISHED {
-        let says = |name: &str| w.effects.contains(&name);
-        let field = |f: &Value, name: &str| f.get(name).and_then(Value::as_str).unwrap_or("").to_owned();
-        // Findings about it, with what they show to be the cause.
-        let shown = |v: &Value| -> Vec<(String, Vec<String>)> {
-            let findings = v.pointer("/history/findings").and_then(Value::as_array);
-            let counts = |f: &&Value| {
-                let found = f.get("found").and_then(Value::as_bool) == Some(true);
-                found && w.findings.contains(&field(f, "kind").as_str()) && !field(f, "cause").is_empty()
-            };
-            let others = |f: &Value| {
-                let all = f.get("alternatives").and_then(Value::as_array).into_iter().flatten();
-                all.filter_map(|a| a.as_str().map(str::to_owned)).collect()
-            };
-            findings.into_iter().flatten().filter(counts).map(|f| (field(f, "cause"), others(f))).collect()
-        };
-        let is_cause = |effect: &str, v: &Value| {
-            w.as_cause.contains(&effect) && shown(v).iter().any(|(cause, _)| cause == effect)
-        };
-        let who = |test: &dyn Fn(&Answer, &Value) -> bool| {
-            let k = answers.iter().filter(|(_, a, v)| test(a, v)).count();
-            format!("{k} of {}", answers.len())
-        };
-        let mut named = who(&|a, v| a.missing.iter().any(|m| says(&m.effect) || is_cause(&m.effect, v)));
-        if !w.as_cause.is_empty() {
-            let others = who(&|a, _| a.missing.iter().any(|m| says(&m.effect)));
-            let _ = write!(named, " ({others} without {})", w.as_cause.join(", "));
-        }
-        let set = who(&|a, v| {
-            let confusable = a.missing.iter().any(|m| m.confusable_with.iter().any(|c| says(c)));
-            confusable || shown(v).iter().any(|(_, others)| others.iter().any(|o| says(o)))
-        });
-        let measured = who(&|_, v| !shown(v).is_empty());
-        let placed = who(&|a, _| {
-            let remarked = a.remarks.iter().any(|r| w.words.iter().any(|x| r.contains(x)));
-            remarked || a.regions.iter().any(|r| w.regions.contains(&r.coordinate.as_str()))
-        });
-        let hidden = who(&|a, v| {
-            let blocked = v.get("blocked_force_N").and_then(Value::as_f64).unwrap_or(f64::NAN);
-            a.considered.iter().any(|c| says(&c.effect) && c.hidden_up_to.is_none_or(|n| n > 0.01 * blocked))
-        });
-        let _ = writeln!(
-            text,
-            "| {} | {} | {named} | {set} | {measured} | {placed} | {hidden} |",
-            w.what,
-            [w.effects, w.as_cause].concat().join(", ")
-        );
-    }
+/// The answers that there are, with label and whole JSON.
+fn answered(diagnosed: &[Diagnosed]) -> Vec<(&str, &Answer, &Value)> {
+    diagnosed.iter().filter_map(|a| a.answer.as_ref().ok().map(|(x, v)| (a.label.as_str(), x, v))).collect()
 }
 
 fn errors(text: &mut String, year: &str, evaluated: &Value) {
@@ -440,6 +313,7 @@ fn errors(text: &mut String, year: &str, evaluated: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::festo_comparison::COMPARISON;
 
     #[test]
     fn the_page_in_the_book_has_these_texts() {
@@ -453,13 +327,6 @@ mod tests {
         for set in &SETS {
             assert!(import(set.year, "staircase").exists() && import(set.year, "settled").exists());
             assert!(set.muscles.iter().all(|m| description(set.year, m.0).exists()), "{}", set.year);
-        }
-    }
-
-    #[test]
-    fn the_published_description_is_compared_by_names_of_the_catalogue() {
-        for name in PUBLISHED.iter().flat_map(|w| w.effects) {
-            assert!(crate::names::owner(name).is_some(), "{name}");
         }
     }
 }

@@ -7,6 +7,7 @@ mod binomial_interval;
 mod book;
 mod campaign;
 mod festo;
+mod festo_comparison;
 mod festo_history;
 mod festo_tables;
 mod figures;

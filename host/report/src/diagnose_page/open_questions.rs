@@ -1,4 +1,4 @@
-//! What remains open after a diagnosis: the unexplained error, effects that could be hidden, the next experiment, and all effects considered.
+//! Open questions after a diagnosis: the unexplained error, effects that could be hidden, the next experiment, and all effects considered.
 
 use pam_diagnose::verdict::{Diagnosis, Pattern, Verdict};
 
