@@ -142,7 +142,7 @@ fn numeric(cell: &str) -> bool {
 fn table(table: &Table) -> Markup {
     html! {
         div.scroll tabindex="0" role="region" aria-label=(inline_markup::plain(&table.caption)) {
-            table {
+            table class=[has_text(table).then_some("text")] {
                 @if !table.caption.is_empty() { caption { (inline_markup::html(&table.caption)) } }
                 thead {
                     tr {
@@ -163,7 +163,9 @@ fn table(table: &Table) -> Markup {
                                         }
                                     }
                                 } @else {
-                                    td class=[right(table, i)] { (inline_markup::html(cell)) }
+                                    td class=[right(table, i)] data-label=(inline_markup::plain(label(table, i))) {
+                                        (inline_markup::html(cell))
+                                    }
                                 }
                             }
                         }
@@ -172,6 +174,18 @@ fn table(table: &Table) -> Markup {
             }
         }
     }
+}
+
+/// From this length on a cell is text, in characters.
+const TEXT: usize = 40;
+
+/// Whether a table has cells of text. On a narrow screen its rows stand as blocks: beside other columns text would be a word wide.
+fn has_text(table: &Table) -> bool {
+    table.rows.iter().flatten().any(|cell| cell.chars().count() >= TEXT)
+}
+
+fn label(table: &Table, column: usize) -> &str {
+    table.header.get(column).map_or("", String::as_str)
 }
 
 /// Columns of numbers are set to the right, heads included.

@@ -11,7 +11,7 @@ pub fn remark(remark: &Remark) -> String {
         Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
         Remark::StaticMisfit(rms) => format!(
             "without the memory, the static model over all mountings still leaves {rms:.2} N rms: geometry, end effects and mounted lengths (±1 mm \
-             by tape measure) are not identifiable from one muscle"
+             by tape measure) are not identifiable from one muscle; three muscles of one type or more, diagnosed together, show them"
         ),
         Remark::MemoryInTable => {
             "the table that -o writes carries the memory as `bladder-creep`, where it predicts the recordings better with it; the length was \
