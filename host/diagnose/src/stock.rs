@@ -18,7 +18,7 @@ use crate::criteria::stock::{EXCHANGEABLE, ONSET, ONSET_STEPS, PLACES, SLOPE_RAN
 use crate::criteria::uncertainty::NORMAL_95;
 use crate::history::answer::{Estimate, FindingKind};
 use crate::history::history;
-pub use mounted_lengths::{CauseError, MountedLengths, MuscleMountings};
+pub use mounted_lengths::{CauseError, LengthsRefusal, MountedLengths, MuscleMountings};
 
 /// An estimate with its standard error and its 95 % interval, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,8 +96,26 @@ pub struct Considered {
     pub jackknife: Option<f64>,
     /// Error on left-out muscles, rms, as a share of the largest force of each.
     pub error: f64,
-    /// Why it is not named, as text; empty where it is.
-    pub why_not: String,
+    /// Why it is not named; `None` for the law that is, and for chance differences.
+    pub why_not: Option<LawRefusal>,
+}
+
+/// Why a law between muscles is not named.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LawRefusal {
+    /// Its parameter would be negative.
+    Negative,
+    /// It does not predict left-out muscles better than chance differences do.
+    NoBetterThanChance,
+    /// Its parameter is too few standard errors from zero.
+    Uncertain {
+        /// How many.
+        t: f64,
+        /// How many are needed.
+        needed: f64,
+    },
+    /// Another law predicts left-out muscles better.
+    OtherLaw,
 }
 
 /// A stock of muscles, diagnosed.
@@ -186,24 +204,20 @@ fn confusable(fitted: &Stock, law: Law) -> Vec<String> {
 fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
     let none = fitted.tried.first().map_or(f64::NAN, |t| t.error);
     let name = named(fitted, freedom).map(|n| n.0);
-    let why = |t: &LawError, law: Option<Law>| {
-        let Some(law) = law else { return String::new() };
-        let value = t.values.first().copied().unwrap_or_default();
-        if name == Some(law) {
-            String::new()
-        } else if !t.plausible() {
-            "its parameter would be negative".to_owned()
-        } else if !(t.error < none) {
-            "it does not predict left-out muscles better than chance differences".to_owned()
-        } else if !(value.value > half_width_95(freedom) * value.std) {
-            format!(
-                "its parameter is {:.1} standard errors from zero, {:.1} are needed",
-                value.value / value.std,
-                half_width_95(freedom)
-            )
+    let needed = half_width_95(freedom);
+    let why = |tried: &LawError, law: Option<Law>| {
+        law.filter(|law| name != Some(*law))?;
+        let value = tried.values.first().copied().unwrap_or_default();
+        let t = value.value / value.std;
+        Some(if !tried.plausible() {
+            LawRefusal::Negative
+        } else if !(tried.error < none) {
+            LawRefusal::NoBetterThanChance
+        } else if !(t > needed) {
+            LawRefusal::Uncertain { t, needed }
         } else {
-            "another law predicts left-out muscles better".to_owned()
-        }
+            LawRefusal::OtherLaw
+        })
     };
     fitted
         .tried
@@ -212,7 +226,7 @@ fn considered(fitted: &Stock, freedom: usize) -> Vec<Considered> {
             let law = t.laws.first().copied();
             Considered {
                 law,
-                parameter: t.values.first().map(|v| Interval::new(*v, half_width_95(freedom))),
+                parameter: t.values.first().map(|v| Interval::new(*v, needed)),
                 jackknife: t.jackknife.first().copied(),
                 error: t.error,
                 why_not: why(t, law),

@@ -2,6 +2,7 @@
 
 mod change;
 mod diagnosis;
+mod history;
 
 pub use change::change_json;
 pub use diagnosis::{DiagnosisDocument, diagnosis_json};

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use pam_diagnose::history::History;
 use pam_diagnose::history::answer::Estimate;
 
+use crate::wording::history as wording;
+
 /// A number with the half-width of its interval.
 pub(crate) fn with_half(estimate: &Estimate, scale: f64, decimals: usize) -> String {
     let value = scale * estimate.value;
@@ -21,6 +23,11 @@ pub(crate) fn assumed(history: &History) -> String {
         Some(pause) => format!("chosen on a grid, weakly known: pause between runs {pause} s, {loaded}"),
         None => format!("pauses between runs by the clock; chosen on a grid, weakly known: {loaded}"),
     }
+}
+
+/// Why no memory is named.
+pub(crate) fn why_not(history: &History) -> String {
+    history.why_not.iter().map(wording::memory_refusal).collect::<Vec<_>>().join("; ")
 }
 
 /// The history as text.
@@ -68,17 +75,23 @@ pub fn text(history: &History) -> String {
         );
         let _ = writeln!(s, "  {}", assumed(history));
     } else {
-        let _ = writeln!(s, "  no memory is named: {}", history.why_not.join("; "));
+        let _ = writeln!(s, "  no memory is named: {}", why_not(history));
     }
     for f in &history.findings {
-        let _ = writeln!(s, "  {} {}", if f.found { "found:    " } else { "not found:" }, f.words);
+        let _ =
+            writeln!(s, "  {} {}", if f.found { "found:    " } else { "not found:" }, wording::finding(f));
     }
     if !history.layers.is_empty() {
         let shares: Vec<String> = history
             .layers
             .iter()
             .map(|l| {
-                format!("{} {:.0} % (entered last {:.0} %)", l.layer, 100.0 * l.in_order, 100.0 * l.last_in)
+                format!(
+                    "{} {:.0} % (entered last {:.0} %)",
+                    wording::layer(l.layer),
+                    100.0 * l.in_order,
+                    100.0 * l.last_in
+                )
             })
             .collect();
         let _ = writeln!(s, "  of the squared error of unseen runs: {}", shares.join(", "));

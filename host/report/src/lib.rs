@@ -25,7 +25,7 @@ pub mod evaluate_page;
 pub mod fit_page;
 pub mod history_text;
 pub mod inline_markup;
-mod stock_mountings;
+pub mod stock_mountings;
 pub mod stock_page;
 pub mod stock_text;
 pub mod timeline_page;

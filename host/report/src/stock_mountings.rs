@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pam_diagnose::stock::{CauseError, MountedLengths, StockDiagnosis};
+use pam_diagnose::stock::{CauseError, LengthsRefusal, MountedLengths, StockDiagnosis};
 use pam_fit::stock::MountingCause;
 
 use super::{Section, Table, fixed};
@@ -24,6 +24,29 @@ fn size(of: &CauseError) -> String {
 
 fn too_large(of: &CauseError) -> &'static str {
     if of.plausible { "" } else { " (more than such a sensor's accuracy)" }
+}
+
+/// Why errors of the lengths of a number of mountings are not named.
+#[must_use]
+pub fn lengths_refusal(mountings: usize, of: LengthsRefusal) -> String {
+    match of {
+        LengthsRefusal::FewMountings { needed } => {
+            format!("{mountings} mountings can be predicted from others; {needed} are needed")
+        }
+        LengthsRefusal::SmallErrors { within } => {
+            format!("mountings are predicted to within {:.0} % of the largest force", 100.0 * within)
+        }
+        LengthsRefusal::SmallGain { left, t, needed } => format!(
+            "a length for each mounting leaves {:.0} % of the squared error ({t:.1} standard errors over mountings; {needed:.1} are needed)",
+            100.0 * left
+        ),
+        LengthsRefusal::OtherCause(cause) => {
+            format!("{} predicts the mountings better", cause.effect().info().name)
+        }
+        LengthsRefusal::FollowContraction => {
+            "the lengths follow the contraction: the muscles differ, in their braid angle for example, not their mountings".to_owned()
+        }
+    }
 }
 
 /// The sentence on the lengths, where they are named.
@@ -62,13 +85,9 @@ pub(crate) fn text(lengths: &MountedLengths) -> String {
             too_large(c)
         );
     }
-    if !lengths.named() {
-        let _ = writeln!(
-            text,
-            "  {} is not named: {}",
-            MountingCause::Length.effect().info().name,
-            lengths.why_not
-        );
+    if let Some(why) = lengths.why_not {
+        let name = MountingCause::Length.effect().info().name;
+        let _ = writeln!(text, "  {name} is not named: {}", lengths_refusal(lengths.mountings, why));
     }
     text
 }
@@ -100,8 +119,8 @@ pub(crate) fn section(answer: &StockDiagnosis, lengths: &MountedLengths) -> Sect
         "The number is fitted to the recordings of one direction and tried on those of the other. A zero of the pressure sensor moves the curves as a \
          length does; it counts as a cause only where a sensor may have it.",
     );
-    if !lengths.named() {
-        section.text(format!("The lengths are not named: {}.", lengths.why_not));
+    if let Some(why) = lengths.why_not {
+        section.text(format!("The lengths are not named: {}.", lengths_refusal(lengths.mountings, why)));
     }
     section
 }

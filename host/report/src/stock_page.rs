@@ -4,7 +4,7 @@ use pam_diagnose::stock::StockDiagnosis;
 use pam_fit::stock::{Law, MountingCause};
 
 use super::stock_mountings;
-use super::stock_text::{headline, law};
+use super::stock_text::{headline, law, law_refusal};
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed};
 
 /// Points of a curve.
@@ -192,7 +192,7 @@ fn laws(answer: &StockDiagnosis) -> Section {
             c.parameter.as_ref().map_or(String::new(), |p| shown(p.value)),
             c.parameter.as_ref().map_or(String::new(), |p| format!("{} to {}", shown(p.low), shown(p.high))),
             fixed(100.0 * c.error, 2),
-            c.why_not.clone(),
+            c.why_not.map_or_else(String::new, law_refusal),
         ]);
     }
     section.table(table);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use pam_diagnose::stock::{Interval, StockDiagnosis};
+use pam_diagnose::stock::{Interval, LawRefusal, StockDiagnosis};
 use pam_fit::stock::Law;
 
 use super::stock_mountings;
@@ -14,6 +14,21 @@ pub(crate) fn law(of: Option<Law>) -> (&'static str, f64, &'static str) {
         Some(Law::Ends) => ("ends of total length λ do not pull: F ∝ 1 − λ/L0", 1e3, "mm"),
         Some(Law::Taper) => ("tapers at the ends grow with contraction: F ∝ 1 − κ·ε/L0", 1e3, "mm"),
         Some(Law::Compliance) => ("the frame yields: x = x_read + F/K", 1e3, "mm/N"),
+    }
+}
+
+/// Why a law between muscles is not named.
+#[must_use]
+pub fn law_refusal(of: LawRefusal) -> String {
+    match of {
+        LawRefusal::Negative => "its parameter would be negative".to_owned(),
+        LawRefusal::NoBetterThanChance => {
+            "it does not predict left-out muscles better than chance differences".to_owned()
+        }
+        LawRefusal::Uncertain { t, needed } => {
+            format!("its parameter is {t:.1} standard errors from zero, {needed:.1} are needed")
+        }
+        LawRefusal::OtherLaw => "another law predicts left-out muscles better".to_owned(),
     }
 }
 
@@ -105,7 +120,7 @@ pub fn text(answer: &StockDiagnosis) -> String {
             .parameter
             .as_ref()
             .map_or(String::new(), |p| format!(": {} {unit}", plus_minus(p, scale, decimals)));
-        let why = if c.why_not.is_empty() { String::new() } else { format!("; {}", c.why_not) };
+        let why = c.why_not.map_or_else(String::new, |why| format!("; {}", law_refusal(why)));
         let _ = writeln!(text, "  {:.2} %  {words}{value}{why}", 100.0 * c.error);
     }
     text

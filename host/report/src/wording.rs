@@ -4,6 +4,7 @@ pub mod change;
 mod experiment;
 mod headline;
 mod hidden;
+pub(crate) mod history;
 mod outcome;
 mod region;
 mod remark;

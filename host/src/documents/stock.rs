@@ -7,6 +7,8 @@ use pam_diagnose::stock::{
     CauseError, Considered, Interval, MountedLengths, MuscleMountings, MuscleOwn, SharedPlace, StockDiagnosis,
 };
 use pam_fit::stock::{Law, MountingCause};
+use pam_report::stock_mountings::lengths_refusal;
+use pam_report::stock_text::law_refusal;
 use serde::Serialize;
 
 /// What muscles of one stock share, and what each has of its own.
@@ -207,7 +209,7 @@ fn mountings(of: &MountedLengths) -> UnseenMountings {
         mountings: of.mountings,
         error_N: of.before,
         causes: of.causes.iter().map(cause).collect(),
-        why_not: of.why_not.clone(),
+        why_not: of.why_not.map_or_else(String::new, |why| lengths_refusal(of.mountings, why)),
     }
 }
 
@@ -260,7 +262,7 @@ fn tried(of: &Considered) -> Tried {
         parameter: of.parameter.as_ref().map(|p| estimate(p, scale, unit)),
         jackknife_std: of.jackknife.map(|j| j * scale),
         left_out_error_pct: 100.0 * of.error,
-        why_not: of.why_not.clone(),
+        why_not: of.why_not.map_or_else(String::new, law_refusal),
     }
 }
 

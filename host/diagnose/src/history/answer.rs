@@ -1,12 +1,13 @@
-//! The history of a campaign as plain values, and as the object `history` of the answer's JSON.
+//! The history of a campaign as plain values.
 
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
-use serde::Serialize;
+use model_core::effects::EffectName;
+use pam_fit::bench::Candidate;
 
 /// A number with its 95 % interval.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     /// Its value.
     pub value: f64,
@@ -41,7 +42,7 @@ impl Estimate {
 }
 
 /// The muscle between two changes of its held length.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Mounting {
     /// Its number, from 1, in the order of the recordings.
     pub number: usize,
@@ -58,7 +59,7 @@ pub struct Mounting {
 }
 
 /// The fitted law of the memory.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MemoryLaw {
     /// Relaxed share of the carried pressure over the whole spectrum.
     pub relaxed_share: Estimate,
@@ -77,7 +78,7 @@ pub struct MemoryLaw {
 }
 
 /// Sizes of errors on held-out points.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorSize {
     /// Root mean square, N.
     pub rms_N: f64,
@@ -90,7 +91,7 @@ pub struct ErrorSize {
 }
 
 /// Each run predicted from the other runs of the muscle.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct UnseenRuns {
     /// A static curve for each mounting and direction.
     pub without_memory: ErrorSize,
@@ -107,7 +108,7 @@ pub struct UnseenRuns {
 }
 
 /// One run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RunError {
     /// Its recording.
     pub name: String,
@@ -130,8 +131,7 @@ pub struct RunError {
 }
 
 /// What a finding is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FindingKind {
     /// The first filling of a mounting pulls less than the second.
     FirstRunDeficit,
@@ -150,7 +150,7 @@ pub enum FindingKind {
 }
 
 /// Something documented of such muscles, as these recordings show it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// What it is about.
     pub kind: FindingKind,
@@ -163,23 +163,136 @@ pub struct Finding {
     /// Sum of squares between those units, for pooling over muscles of one protocol.
     pub squares: f64,
     /// The effect that explains it; absent where none does.
-    pub cause: Option<String>,
+    pub cause: Option<Candidate>,
     /// Effects that explain as well what the cause does within a run.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub alternatives: Vec<String>,
+    pub alternatives: Vec<EffectName>,
     /// Number of the mounting, from 1, where it is about one.
     pub mounting: Option<usize>,
     /// Number of the run within the mounting, from 1, where it is about one.
     pub run: Option<usize>,
-    /// As text.
-    pub words: String,
+    /// What is known of it beyond its size.
+    pub detail: FindingDetail,
+}
+
+/// What is known of a finding beyond its size, by its kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FindingDetail {
+    /// Of a first-run deficit.
+    FirstRun {
+        /// What the memory leaves of it, N; absent where no memory is its cause.
+        left: Option<f64>,
+    },
+    /// Of creep.
+    Creep {
+        /// Over how many decades of time.
+        decades: usize,
+        /// Force gained in tenfold time at the top pressure, N; absent of too few runs.
+        plateau: Option<Estimate>,
+    },
+    /// Of a gap between filling and emptying; absent where it is not found, or no memory is named.
+    Gap(Option<GapBesideMemory>),
+    /// Of a slip or a bad run: how much shorter than at full length its mounting is held, mm.
+    Shift {
+        /// In mm.
+        shortened_mm: f64,
+    },
+    /// Of a load before the first run.
+    LoadedBefore,
+    /// Of the reading of a slack muscle: by how much it grows up to the highest pressure, N; absent where it does not follow the pressure.
+    SlackReading {
+        /// In N.
+        grows: Option<f64>,
+    },
+}
+
+/// What explains the gap between filling and emptying, and what does not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GapBesideMemory {
+    /// What the memory leaves of it, N.
+    pub left: Option<Estimate>,
+    /// The effect that unseen runs need beside the memory.
+    pub beside: Option<NeededEffect>,
+    /// Friction in place of the memory within a run.
+    pub instead: Option<InPlaceOfMemory>,
+}
+
+/// An effect that unseen runs need beside the memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NeededEffect {
+    /// The effect.
+    pub effect: Candidate,
+    /// Its largest force, N.
+    pub peak: Estimate,
+    /// Error of unseen runs without it, rms, N.
+    pub without_N: f64,
+    /// With it.
+    pub with_N: f64,
+}
+
+/// Friction in place of the memory's fast part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InPlaceOfMemory {
+    /// Error of unseen runs with the friction, rms, % of the largest force.
+    pub friction_pct: f64,
+    /// With the whole memory.
+    pub memory_pct: f64,
+    /// Whether unseen runs exclude it.
+    pub excluded: bool,
+}
+
+/// A rule of a named memory that does not hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MemoryRefusal {
+    /// The relaxed share is smaller than the least that is named.
+    SmallShare {
+        /// The share.
+        share: f64,
+        /// The least.
+        least: f64,
+    },
+    /// The relaxed share is within its interval of none.
+    UncertainShare {
+        /// The share.
+        share: f64,
+        /// Half of its 95 % interval.
+        half: f64,
+    },
+    /// The squared error of unseen runs falls by too little.
+    SmallGain {
+        /// What the memory is compared with.
+        against: StaticCurve,
+        /// The share by which it falls.
+        gain: f64,
+        /// The least.
+        least: f64,
+    },
+}
+
+/// A static model of unseen runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StaticCurve {
+    /// A curve for each mounting.
+    ByMounting,
+    /// A curve for each mounting and direction.
+    ByMountingAndDirection,
+}
+
+/// A layer of the explanation of unseen runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayerName {
+    /// The memory of the bladder.
+    Memory,
+    /// Slips of the held length.
+    Slips,
+    /// What neither explains.
+    NotExplained,
 }
 
 /// What one layer takes of the squared error of unseen runs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LayerShare {
-    /// Its name.
-    pub layer: String,
+    /// The layer.
+    pub layer: LayerName,
     /// Share that it takes when the layers enter in this order.
     pub in_order: f64,
     /// Share of the error without this layer alone that it takes when it enters last.
@@ -187,7 +300,7 @@ pub struct LayerShare {
 }
 
 /// Force over time since the mounting at one pressure, for a picture.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Course {
     /// Number of the mounting, from 1.
     pub mounting: usize,
@@ -204,12 +317,12 @@ pub struct Course {
 }
 
 /// The history of a campaign of isometric staircases.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct History {
     /// Whether the memory is named: its rules hold.
     pub named: bool,
-    /// Which rules do not hold, as text; empty where it is named.
-    pub why_not: Vec<String>,
+    /// Which rules do not hold; empty where it is named.
+    pub why_not: Vec<MemoryRefusal>,
     /// Settled points.
     pub points: usize,
     /// Whether rows were averaged into settled points after each pulse.

@@ -1,9 +1,9 @@
-//! From the fits to the answer: the rules of the verdict, and each finding as text.
+//! From the fits to the answer: the rules of the verdict, and each finding.
 
 use super::Fits;
 use super::answer::{
-    Course, ErrorSize, Estimate, Finding, FindingKind, History, LayerShare, MemoryLaw, Mounting, RunError,
-    UnseenRuns,
+    Course, ErrorSize, Estimate, Finding, FindingDetail, FindingKind, History, LayerName, LayerShare,
+    MemoryLaw, MemoryRefusal, Mounting, RunError, StaticCurve, UnseenRuns,
 };
 use super::campaign::Points;
 use super::criteria::{JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES};
@@ -15,6 +15,7 @@ use super::slack_reading::SlackReading;
 use super::unseen::{Sizes, Unseen};
 use model_core::effects::EffectName;
 use pam_data::recording::Campaign;
+use pam_fit::bench::Candidate;
 use pam_fit::numerics::student::half_width_95;
 
 /// Share by which the squared error falls.
@@ -49,7 +50,7 @@ pub(super) fn answer(points: &Points, fits: &Fits<'_>, campaign: &Campaign, rest
 }
 
 /// The rules of a named memory that do not hold.
-fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String> {
+fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<MemoryRefusal> {
     let share = law.fit.theta[0];
     let supported = points.supported();
     let counts = |i: usize| supported[i] && fits.by_direction.predicted[i].is_finite();
@@ -59,25 +60,19 @@ fn why_not(points: &Points, fits: &Fits<'_>, law: &Law, half: f64) -> Vec<String
     let after = needed.map_or(unseen, |n| &n.with_memory).sizes(points, counts);
     let mut why = Vec::new();
     if !(share >= MEMORY_LEAST_SHARE) {
-        why.push(format!("the relaxed share is {share:.3}; {MEMORY_LEAST_SHARE} is the least that is named"));
+        why.push(MemoryRefusal::SmallShare { share, least: MEMORY_LEAST_SHARE });
     }
     if !(share > half) {
-        why.push(format!(
-            "the relaxed share {share:.3} is within its 95 % interval of none (± {half:.3}, by runs)"
-        ));
+        why.push(MemoryRefusal::UncertainShare { share, half });
     }
     let statics = [
-        (&fits.by_direction, "a curve for each mounting and direction"),
-        (needed.map_or(&fits.plain, |n| &n.alone), "a curve for each mounting"),
+        (&fits.by_direction, StaticCurve::ByMountingAndDirection),
+        (needed.map_or(&fits.plain, |n| &n.alone), StaticCurve::ByMounting),
     ];
-    for (one, words) in statics {
-        let gained = gain(one.sizes(points, counts), after);
-        if !(gained >= LEAST_GAIN) {
-            why.push(format!(
-                "against {words} the squared error of unseen runs falls by {:.0} %; {:.0} % is the least",
-                100.0 * gained,
-                100.0 * LEAST_GAIN
-            ));
+    for (one, against) in statics {
+        let gain = gain(one.sizes(points, counts), after);
+        if !(gain >= LEAST_GAIN) {
+            why.push(MemoryRefusal::SmallGain { against, gain, least: LEAST_GAIN });
         }
     }
     why
@@ -171,30 +166,22 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
     found.push(creep(points, fits, named, half));
     found.extend(gap::finding(points, fits, visits, named));
     found.extend(fits.events.iter().map(|e| {
-        let length = 1e3 * points.mountings[e.mounting].stroke;
-        let half = if e.lasts { half_width_95(fits.memory.folds.len().saturating_sub(1)) * e.error } else { 2.0 * e.error };
+        let half = if e.lasts {
+            half_width_95(fits.memory.folds.len().saturating_sub(1)) * e.error
+        } else {
+            2.0 * e.error
+        };
         Finding {
             kind: if e.lasts { FindingKind::Slip } else { FindingKind::BadRun },
             found: e.sure,
             size: Estimate::new(e.shift, Some(half), "kPa", "run"),
             units: points.mountings[e.mounting].runs.len(),
             squares: 0.0,
-            cause: (e.lasts && e.sure).then(|| EffectName::EndSlip.info().name.to_owned()),
+            cause: (e.lasts && e.sure).then_some(Candidate::Muscle(EffectName::EndSlip)),
             alternatives: Vec::new(),
             mounting: Some(e.mounting + 1),
             run: Some(e.run),
-            words: format!(
-                "mounting {} (shortened by {length:.1} mm), run {}: {} shift of {:+.1} ± {half:.1} kPa against the other runs; {}",
-                e.mounting + 1,
-                e.run,
-                if e.lasts { "from this run on a" } else { "a" },
-                e.shift,
-                match (e.lasts, e.sure) {
-                    (true, true) => "the held length changed",
-                    (true, false) => "the held length may have changed; a finding requires four standard errors",
-                    (false, _) => "look at this run before it is used",
-                }
-            ),
+            detail: FindingDetail::Shift { shortened_mm: 1e3 * points.mountings[e.mounting].stroke },
         }
     }));
     found.extend(fits.slack_reading.as_ref().map(SlackReading::finding));
@@ -210,10 +197,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             alternatives: Vec::new(),
             mounting: None,
             run: None,
-            words: format!(
-                "the muscle had been loaded for about {loaded:.0} s before the first recorded run: a smaller first-run deficit is to be \
-                 expected (chosen on a grid, weakly known)"
-            ),
+            detail: FindingDetail::LoadedBefore,
         });
     }
     found
@@ -221,13 +205,6 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
 
 fn estimate(contrast: &Contrast, of: &str) -> Estimate {
     Estimate::new(contrast.mean, contrast.half, "N", of)
-}
-
-pub(super) fn plus_minus(contrast: &Contrast) -> String {
-    contrast.half.map_or_else(
-        || format!("{:.1} N (one unit: no interval)", contrast.mean),
-        |h| format!("{:.1} ± {h:.1} N", contrast.mean),
-    )
 }
 
 fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> Option<Finding> {
@@ -240,60 +217,35 @@ fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> 
     let found = deficit.mean > 0.0 && (deficit.is_positive() || above);
     let (_, unseen) = fits.best();
     let left = findings::first_run_left(points, &unseen.predicted);
-    let words = format!(
-        "the first filling of a mounting pulls {} less than the second ({} shortened mountings){}",
-        plus_minus(&deficit),
-        deficit.units,
-        match (found, named, left) {
-            (true, true, Some(l)) => format!(
-                "; one memory of the bladder, which does not recover in the pauses; of the first filling it leaves {:.1} N",
-                -l
-            ),
-            (true, _, _) => String::new(),
-            (false, _, _) => "; its interval includes none".to_owned(),
-        }
-    );
     Some(Finding {
         kind: FindingKind::FirstRunDeficit,
         found,
         size: estimate(&deficit, "mounting"),
         units: deficit.units,
         squares: deficit.squares,
-        cause: (found && named).then(|| EffectName::LogCreep.info().name.to_owned()),
+        cause: (found && named).then_some(Candidate::Muscle(EffectName::LogCreep)),
         alternatives: Vec::new(),
         mounting: None,
         run: Some(1),
-        words,
+        detail: FindingDetail::FirstRun { left: left.filter(|_| found && named) },
     })
 }
 
 fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
     let (law, _) = fits.best();
     let share = law.fit.theta[0];
-    let plateau = findings::plateau_creep(points).filter(|p| p.units > 2).map(|p| {
-        format!(
-            "; at the top pressure the force of shortened mountings creeps by {} a decade",
-            plus_minus(&p)
-        )
-    });
+    let plateau = findings::plateau_creep(points).filter(|p| p.units > 2);
     Finding {
         kind: FindingKind::Creep,
         found: named,
         size: Estimate::new(share, Some(half), "", "run"),
         units: points.runs.len(),
         squares: 0.0,
-        cause: named.then(|| EffectName::LogCreep.info().name.to_owned()),
+        cause: named.then_some(Candidate::Muscle(EffectName::LogCreep)),
         alternatives: Vec::new(),
         mounting: None,
         run: None,
-        words: format!(
-            "the part of the pressure that the bladder carries relaxes by {:.1} ± {:.1} % a decade of time, over {} decades, and the next \
-             run remembers it{}",
-            100.0 * share / TIMES.len() as f64,
-            100.0 * half / TIMES.len() as f64,
-            TIMES.len(),
-            plateau.unwrap_or_default()
-        ),
+        detail: FindingDetail::Creep { decades: TIMES.len(), plateau: plateau.map(|p| estimate(&p, "run")) },
     }
 }
 
@@ -315,15 +267,14 @@ fn layers(points: &Points, fits: &Fits<'_>) -> Vec<LayerShare> {
     match (&fits.with_slips, &fits.slips_alone) {
         (Some((_, both)), Some(slips)) => {
             let (both, slips) = (square(both), square(slips));
-            layers.push(("memory", share(none - memory, none), share(slips - both, slips)));
-            layers.push(("slips", share(memory - both, none), share(memory - both, memory)));
+            layers.push((LayerName::Memory, share(none - memory, none), share(slips - both, slips)));
+            layers.push((LayerName::Slips, share(memory - both, none), share(memory - both, memory)));
             left = both;
         }
-        _ => layers.push(("memory", share(none - memory, none), share(none - memory, none))),
+        _ => layers.push((LayerName::Memory, share(none - memory, none), share(none - memory, none))),
     }
-    layers.push(("not explained", share(left, none), share(left, none)));
-    let entry =
-        |(layer, in_order, last_in): (&str, f64, f64)| LayerShare { layer: layer.into(), in_order, last_in };
+    layers.push((LayerName::NotExplained, share(left, none), share(left, none)));
+    let entry = |(layer, in_order, last_in): (LayerName, f64, f64)| LayerShare { layer, in_order, last_in };
     layers.into_iter().map(entry).collect()
 }
 

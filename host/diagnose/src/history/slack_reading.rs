@@ -7,17 +7,16 @@
 //! Unit of uncertainty: mounting.
 
 use pam_data::statistics;
-use pam_fit::bench::BenchName;
+use pam_fit::bench::{BenchName, Candidate};
 use pam_fit::numerics::median;
 
-use super::answer::{Estimate, Finding, FindingKind};
+use super::answer::{Estimate, Finding, FindingDetail, FindingKind};
 use super::campaign::Points;
 use super::criteria::{
     PULLS, RAMP, SLACK_FLAT, SLACK_FOLLOWS, SLACK_KNEE, SLACK_PART, SLACK_POINTS, SLACK_RANGE,
     SLACK_STRAIGHT, THRESHOLD_FROM, THRESHOLD_TO,
 };
 use super::findings::Contrast;
-use super::judge::plus_minus;
 use super::shift_fit;
 
 /// Readings of a slack muscle.
@@ -183,33 +182,19 @@ impl SlackReading {
 
     /// As a finding.
     pub(super) fn finding(&self) -> Finding {
-        let mountings = self.mean.units;
-        let words = if self.effect == BenchName::CrossTalk {
-            format!(
-                "while the muscle is slack, the reading of the load cell grows with the pressure: by {:.1} N up to the highest pressure where it \
-                 grows least ({mountings} mountings), which is more than a lifting tube makes: it reads the pressure",
-                self.force
-            )
-        } else {
-            let cause = match (self.found, self.mean.mean > 0.0) {
-                (false, _) => "",
-                (true, true) => ": the zero of the cell is off, or a weight hangs on it",
-                (true, false) => ": the zero of the cell is off, or the slack tube pushes",
-            };
-            let value = plus_minus(&self.mean);
-            format!("while the muscle is slack, the load cell reads {value} ({mountings} mountings){cause}")
-        };
         Finding {
             kind: FindingKind::SlackReading,
             found: self.found,
             size: Estimate::new(self.mean.mean, self.mean.half, "N", "mounting"),
-            units: mountings,
+            units: self.mean.units,
             squares: self.mean.squares,
-            cause: self.found.then(|| self.effect.info().name.to_owned()),
+            cause: self.found.then_some(Candidate::Bench(self.effect)),
             alternatives: Vec::new(),
             mounting: None,
             run: None,
-            words,
+            detail: FindingDetail::SlackReading {
+                grows: (self.effect == BenchName::CrossTalk).then_some(self.force),
+            },
         }
     }
 }

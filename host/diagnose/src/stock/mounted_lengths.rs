@@ -23,6 +23,34 @@ pub struct CauseError {
     pub plausible: bool,
 }
 
+/// Why errors of the mounted lengths are not named.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LengthsRefusal {
+    /// Too few mountings can be predicted from others.
+    FewMountings {
+        /// How many are needed.
+        needed: usize,
+    },
+    /// Mountings are predicted to within a share of the largest force that does not matter.
+    SmallErrors {
+        /// The share.
+        within: f64,
+    },
+    /// A length for each mounting explains too little.
+    SmallGain {
+        /// The share of the squared error that it leaves.
+        left: f64,
+        /// Standard errors over the mountings by which the error falls.
+        t: f64,
+        /// How many are needed.
+        needed: f64,
+    },
+    /// Another number predicts the mountings better.
+    OtherCause(MountingCause),
+    /// The lengths follow the contraction: the muscles differ, in their braid angle for example, and not their mountings.
+    FollowContraction,
+}
+
 /// Errors of the left-out mountings of one muscle, rms, N.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MuscleMountings {
@@ -47,8 +75,8 @@ pub struct MountedLengths {
     pub t: f64,
     /// Effects that predict the mountings as well.
     pub confusable_with: Vec<&'static str>,
-    /// Why the lengths are not named, as text; empty where they are.
-    pub why_not: String,
+    /// Why the lengths are not named; `None` where they are.
+    pub why_not: Option<LengthsRefusal>,
     /// By muscle; `None` for one without a mounting that was predicted.
     pub muscles: Vec<Option<MuscleMountings>>,
 }
@@ -57,7 +85,7 @@ impl MountedLengths {
     /// Whether the lengths are named.
     #[must_use]
     pub fn named(&self) -> bool {
-        self.why_not.is_empty()
+        self.why_not.is_none()
     }
 
     /// The errors with one number for each mounting.
@@ -103,20 +131,15 @@ pub(super) fn mounted_lengths(fitted: &Stock) -> Option<MountedLengths> {
     let size = causes[LENGTH].size;
     let std = size / (2.0 * count as f64).sqrt();
     let why_not = if count < FEWEST_MOUNTINGS {
-        format!("{count} mountings can be predicted from others; {FEWEST_MOUNTINGS} are needed")
+        Some(LengthsRefusal::FewMountings { needed: FEWEST_MOUNTINGS })
     } else if !(sum_of_squares(&before) >= count as f64 * RELEVANT_SIZE.powi(2)) {
-        format!("mountings are predicted to within {:.0} % of the largest force", 100.0 * RELEVANT_SIZE)
+        Some(LengthsRefusal::SmallErrors { within: RELEVANT_SIZE })
     } else if !(left <= 1.0 - LENGTH_GAIN && t > enough) {
-        format!(
-            "a length for each mounting leaves {:.0} % of the squared error ({t:.1} standard errors over mountings; {enough:.1} are needed)",
-            100.0 * left
-        )
+        Some(LengthsRefusal::SmallGain { left, t, needed: enough })
     } else if let Some(k) = others().find(|k| better(*k)) {
-        format!("{} predicts the mountings better", causes[k].cause.effect().info().name)
-    } else if follow_contraction(&all, fitted) {
-        "the lengths follow the contraction: the muscles differ, in their braid angle for example, not their mountings".to_owned()
+        Some(LengthsRefusal::OtherCause(causes[k].cause))
     } else {
-        String::new()
+        follow_contraction(&all, fitted).then_some(LengthsRefusal::FollowContraction)
     };
     let confusable = others().filter(|k| !worse(*k));
     Some(MountedLengths {

@@ -1,6 +1,7 @@
 //! The chapter on what the muscle remembers over a campaign of staircases.
 
-use crate::history_text::{assumed, with_half};
+use crate::history_text::{assumed, why_not, with_half};
+use crate::wording::history as wording;
 use crate::{Axis, Colour, Figure, Mark, Panel, Section, Table, figures, fixed};
 use pam_diagnose::history::History;
 
@@ -19,10 +20,12 @@ pub(super) fn section(history: Option<&History>) -> Section {
         u.with_slips.map_or(String::new(), |e| format!(", {} % beside the slips", fixed(e.rms_pct, 2)))
     ));
     if !h.named {
-        section.text(format!("No memory is named: {}.", h.why_not.join("; ")));
+        section.text(format!("No memory is named: {}.", why_not(h)));
     }
     section.list(
-        h.findings.iter().map(|f| format!("{}: {}", if f.found { "Found" } else { "Not found" }, f.words)),
+        h.findings
+            .iter()
+            .map(|f| format!("{}: {}", if f.found { "Found" } else { "Not found" }, wording::finding(f))),
     );
     section.table(parameters(h));
     section.figure(run_in(h));
@@ -161,7 +164,11 @@ fn layers(h: &History) -> Table {
         &["layer", "entered in this order (%)", "entered last (%)"],
     );
     for l in &h.layers {
-        table.row([l.layer.clone(), fixed(100.0 * l.in_order, 0), fixed(100.0 * l.last_in, 0)]);
+        table.row([
+            wording::layer(l.layer).to_owned(),
+            fixed(100.0 * l.in_order, 0),
+            fixed(100.0 * l.last_in, 0),
+        ]);
     }
     table
 }

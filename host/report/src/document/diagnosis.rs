@@ -3,13 +3,13 @@
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
-use pam_diagnose::history::History;
 use pam_diagnose::verdict::{
     Considered, Diagnosis, HeldOut, Missing, NextExperiment, ParameterValue, PathStep, Profile, Region,
     Trace, Verdict,
 };
 use serde::Serialize;
 
+use super::history::HistoryDocument;
 use crate::effect_page::place;
 use crate::wording;
 
@@ -188,8 +188,7 @@ pub struct DiagnosisDocument<'a> {
     trace: TraceDocument<'a>,
     /// What the muscle remembers over a campaign of isometric staircases; absent of other campaigns.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[cfg_attr(test, schemars(with = "Option<serde_json::Value>"))]
-    history: Option<&'a History>,
+    history: Option<HistoryDocument<'a>>,
 }
 
 /// The diagnosis as JSON text.
@@ -232,7 +231,7 @@ impl<'a> DiagnosisDocument<'a> {
             remarks: d.remarks.iter().map(wording::remark).collect(),
             profiles: d.profiles.iter().map(profile).collect(),
             trace: trace(&d.trace),
-            history: d.history.as_ref(),
+            history: d.history.as_ref().map(HistoryDocument::of),
         }
     }
 }

@@ -153,7 +153,7 @@ fn a_slack_muscle_shows_what_the_load_cell_reads() {
         assert!(reading.found && reading.effect == effect, "{reading:?}");
         assert!((reading.amplitude / amplitude - 1.0).abs() < 0.25, "{reading:?}, {amplitude} is true");
         let finding = found.answer.of(FindingKind::SlackReading).next().expect("a finding");
-        assert_eq!(finding.cause.as_deref(), Some(effect.info().name));
+        assert_eq!(finding.cause, Some(Candidate::Bench(effect)));
     }
 }
 

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::super::answer::FindingKind;
 use super::super::{History, history};
+use model_core::effects::EffectName;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Import, Reader};
+use pam_fit::bench::Candidate;
 
 fn settled(year: &str, muscle: &str) -> Option<History> {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -63,7 +65,7 @@ fn the_gap_is_the_memorys_where_friction_is_excluded() {
     for (year, muscle) in [("2021", "27cm"), ("2021", "29cm"), ("2022", "83mm")] {
         let Some(h) = settled(year, muscle) else { return };
         let gap = h.of(FindingKind::FillingEmptyingGap).next().expect("a gap");
-        assert!(gap.found && gap.cause.as_deref() == Some("log-creep"), "{muscle}: {gap:?}");
+        assert!(gap.found && gap.cause == Some(Candidate::Muscle(EffectName::LogCreep)), "{muscle}: {gap:?}");
         assert!(gap.alternatives.is_empty(), "{muscle}: {gap:?}");
     }
 }

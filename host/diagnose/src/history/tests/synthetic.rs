@@ -129,7 +129,10 @@ fn share_and_stress_free_pressure_are_recovered() {
     }
     assert!((h.law.balance_pressure.value - MEMORY.balance).abs() < 15.0, "{:?}", h.law.balance_pressure);
     assert!(h.unseen.gain > 0.5 && h.law.one_time_constant_ratio > 1.1, "{:?}", h.law);
-    assert!(h.of(FindingKind::FirstRunDeficit).any(|f| f.found && f.cause.as_deref() == Some("log-creep")));
+    assert!(
+        h.of(FindingKind::FirstRunDeficit)
+            .any(|f| f.found && f.cause == Some(Candidate::Muscle(EffectName::LogCreep)))
+    );
     assert_eq!(h.of(FindingKind::Slip).chain(h.of(FindingKind::BadRun)).count(), 0);
 }
 
@@ -216,7 +219,10 @@ fn the_gap_of_a_memory_is_not_put_down_to_friction() {
     for seed in 0..3 {
         let h = diagnosed(&campaign(MEMORY, 400 + seed));
         let gap = h.of(FindingKind::FillingEmptyingGap).next().expect("a gap");
-        assert!(gap.found && gap.cause.as_deref() == Some("log-creep"), "seed {seed}: {gap:?}");
+        assert!(
+            gap.found && gap.cause == Some(Candidate::Muscle(EffectName::LogCreep)),
+            "seed {seed}: {gap:?}"
+        );
         assert!(gap.alternatives.is_empty(), "seed {seed}: {gap:?}");
     }
 }
