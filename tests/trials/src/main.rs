@@ -218,6 +218,7 @@ enum Command {
     Maps(Real),
     /// Answer a development set again with each criterion at half and at double its value.
     Sensitivity(sensitivity::Study),
+    Ablation(sensitivity::ablation::Ablation),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
     /// Diagnose muscles of the virtual bench whose length was held, clean ones and with one effect.
@@ -290,6 +291,7 @@ fn main() -> ExitCode {
         Command::FestoTables(real) => festo::run_tables(&real.data, &real.output, real.page.as_deref()),
         Command::Campaign(what) => campaign::run(&what),
         Command::Sensitivity(study) => sensitivity::run(&study),
+        Command::Ablation(ablation) => sensitivity::ablation::run(&ablation),
         Command::Sensors(what) => sensors::run(&what),
         Command::Held(what) => held::run(&what),
         Command::Reference(what) => reference::run(&what),
