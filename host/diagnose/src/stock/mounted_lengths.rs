@@ -95,9 +95,6 @@ impl MountedLengths {
     }
 }
 
-/// The position of a cause among the errors of a mounting.
-const LENGTH: usize = 0;
-
 /// The lengths of a stock; `None` where no held mounting can be predicted from others.
 pub(super) fn mounted_lengths(fitted: &Stock) -> Option<MountedLengths> {
     let all = unseen_mountings(&fitted.cells, &fitted.laws, &fitted.fit);
@@ -121,23 +118,24 @@ pub(super) fn mounted_lengths(fitted: &Stock) -> Option<MountedLengths> {
     };
     let before = relative(&|u| u.square);
     let with: Vec<Vec<f64>> = (0..causes.len()).map(|k| relative(&|u| u.with[k])).collect();
-    let left = sum_of_squares(&with[LENGTH]) / sum_of_squares(&before);
-    let t = gain(&before, &with[LENGTH]);
+    let with_length = &with[MountingCause::Length as usize];
+    let left = sum_of_squares(with_length) / sum_of_squares(&before);
+    let t = gain(&before, with_length);
     let enough = half_width(LENGTH_ALPHA, count as f64 - 1.0);
     let quantile = half_width_95(count.saturating_sub(1));
-    let better = |k: usize| gain(&with[LENGTH], &with[k]) > quantile;
-    let worse = |k: usize| gain(&with[k], &with[LENGTH]) > quantile;
+    let better = |k: usize| gain(with_length, &with[k]) > quantile;
+    let worse = |k: usize| gain(&with[k], with_length) > quantile;
     let others = || (1..causes.len()).filter(|k| causes[*k].plausible);
-    let size = causes[LENGTH].size;
+    let size = causes[MountingCause::Length as usize].size;
     let std = size / (2.0 * count as f64).sqrt();
     let why_not = if count < FEWEST_MOUNTINGS {
         Some(LengthsRefusal::FewMountings { needed: FEWEST_MOUNTINGS })
     } else if !(sum_of_squares(&before) >= count as f64 * RELEVANT_SIZE.powi(2)) {
         Some(LengthsRefusal::SmallErrors { within: RELEVANT_SIZE })
-    } else if !(left <= 1.0 - LENGTH_GAIN && t > enough) {
-        Some(LengthsRefusal::SmallGain { left, t, needed: enough })
     } else if let Some(k) = others().find(|k| better(*k)) {
         Some(LengthsRefusal::OtherCause(causes[k].cause))
+    } else if !(left <= 1.0 - LENGTH_GAIN && t > enough) {
+        Some(LengthsRefusal::SmallGain { left, t, needed: enough })
     } else {
         follow_contraction(&all, fitted).then_some(LengthsRefusal::FollowContraction)
     };
@@ -190,8 +188,10 @@ fn of_muscle(all: &[UnseenMounting], m: usize) -> Option<MuscleMountings> {
     let rms = |of: &dyn Fn(&UnseenMounting) -> f64| {
         (own.iter().map(|u| of(u)).sum::<f64>() / own.len() as f64).sqrt()
     };
-    (!own.is_empty())
-        .then(|| MuscleMountings { before: rms(&|u| u.square), with_length: rms(&|u| u.with[LENGTH]) })
+    (!own.is_empty()).then(|| MuscleMountings {
+        before: rms(&|u| u.square),
+        with_length: rms(&|u| u.with[MountingCause::Length as usize]),
+    })
 }
 
 /// Whether a straight line over the strokes of a muscle's other mountings predicts the lengths better than their mean does.
@@ -201,7 +201,12 @@ fn follow_contraction(all: &[UnseenMounting], fitted: &Stock) -> bool {
         let own: Vec<(f64, f64)> = all
             .iter()
             .filter(|u| u.member == m)
-            .filter_map(|u| Some((fitted.cells.mountings[m][u.mounting].stroke?, u.number[LENGTH])))
+            .filter_map(|u| {
+                Some((
+                    fitted.cells.mountings[m][u.mounting].stroke?,
+                    u.number[MountingCause::Length as usize],
+                ))
+            })
             .collect();
         // A line through two others is no test.
         if own.len() < 4 {
