@@ -86,7 +86,7 @@ fn other_causes_are_not_called_lengths() {
     let refusal = |bench: &Bench| lengths(bench).why_not;
     let zero = Bench { zero: |m, k| 9.0 * scattered(m, k), ..EXACT };
     let scale = Bench { scale: |m, k| 1.0 + 0.06 * scattered(m, k), ..EXACT };
-    let braid = Bench { onset: |m| 0.05 * scattered(m, 1), ..EXACT };
+    let braid = Bench { onset: |m| 0.15 * scattered(m, 0), ..EXACT };
     assert!(matches!(refusal(&EXACT), Some(LengthsRefusal::SmallErrors { .. })));
     assert_eq!(refusal(&zero), Some(LengthsRefusal::OtherCause(MountingCause::ForceZero)));
     assert_eq!(refusal(&scale), Some(LengthsRefusal::OtherCause(MountingCause::ForceScale)));
