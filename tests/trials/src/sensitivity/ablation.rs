@@ -53,7 +53,7 @@ const RULES: [Rule; 15] = [
     rule("errors of the base model itself select nothing", &["SELECTION_FLOOR"], 1e-6),
     rule("static effects are selected from a size on", &["STATIC_PEAK", "STATIC_MOVED"], 1e-6),
     rule("effects that the tables conceal are not selected", &["CONCEALED", "TWIN_OF_TABLES"], 1e-9),
-    rule("an effect gives way to a concealed one that scores more", &["SHADOW"], 1e6),
+    rule("a concealed effect that scores more keeps another from being selected", &["SHADOW"], 1e6),
     rule("the joint fit keeps what the single fit promised", &["KEPT_GAIN"], 1e-6),
     rule("a selected effect is exchanged for a better one", &["EXCHANGE_LEAVES"], 1e-6),
     rule("an effect lowers the error on held-out rows", &["HELD_OUT_LEAVES"], 1e6),
