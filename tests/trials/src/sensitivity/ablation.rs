@@ -57,7 +57,7 @@ const RULES: [Rule; 15] = [
     rule("the joint fit keeps what the single fit promised", &["KEPT_GAIN"], 1e-6),
     rule("a selected effect is exchanged for a better one", &["EXCHANGE_LEAVES"], 1e-6),
     rule("an effect lowers the error on held-out rows", &["HELD_OUT_LEAVES"], 1e6),
-    rule("the interval of a size excludes zero, and values are possible", &["SIZE_ERRORS"], 1e-6),
+    rule("the interval of a size excludes zero", &["SIZE_ERRORS"], 1e-6),
 ];
 
 const fn rule(what: &'static str, criteria: &'static [&'static str], factor: f64) -> Rule {
