@@ -60,6 +60,7 @@ pub mod next_experiment;
 mod noise;
 mod options;
 pub mod outcome;
+mod paired;
 mod preconditions;
 pub mod protocol_simulation;
 pub mod reference;

@@ -52,12 +52,10 @@ pub fn predict_with_stock(members: &[Member<'_>], clips: &[Option<f64>]) -> Resu
         let mut length = Predicted::default();
         add(&mut length, members, &cells, m, None, &without, clip)?;
         let mut contractions = Predicted::default();
-        let held: Vec<usize> =
-            (0..cells.mountings[m].len()).filter(|k| cells.mountings[m][*k].stroke.is_some()).collect();
-        for mounting in held.iter().filter(|_| held.len() > 1) {
-            let others = cells.only(|c| c.member != m || c.mounting != *mounting);
+        for mounting in cells.held_mountings(m) {
+            let others = cells.only(|c| c.member != m || c.mounting != mounting);
             let without = fit(&others, &LAWS, Some(&whole)).ok_or_else(unusable)?;
-            add(&mut contractions, members, &cells, m, Some(*mounting), &without, clip)?;
+            add(&mut contractions, members, &cells, m, Some(mounting), &without, clip)?;
         }
         Ok(StockTransfer {
             length: length.tally.score,

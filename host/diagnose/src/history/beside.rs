@@ -8,11 +8,12 @@ use pam_fit::numerics::student::{chance_beyond, half_width_95};
 
 use super::campaign::{Points, Run};
 use super::criteria::{KEPT_ERRORS, MEMORY_KEPT_GAIN};
-use super::held_table::{gain_by_runs, predicts_better};
+use super::held_table::predicts_better;
 use super::law::{Law, Layer};
 use super::run_offset;
 use super::unseen::{self, Unseen, jackknife};
 use crate::criteria::candidates::AMPLITUDE_BEYOND;
+use crate::paired::errors_below;
 
 /// An effect of the catalogue as a shift of pressure.
 pub(super) struct Column {
@@ -81,12 +82,6 @@ pub(super) fn measured(points: &Points, law: Law, unseen: Unseen) -> Tried {
     let squares = points.runs.iter().map(square).collect();
     let rms = unseen.sizes(points, |i| supported[i]).rms;
     Tried { law, unseen, squares, rms }
-}
-
-/// How many standard errors by runs one sum of squares lies below another.
-fn errors_below(with: &[f64], without: &[f64]) -> f64 {
-    let (gain, error) = gain_by_runs(with, without);
-    gain / error.max(f64::MIN_POSITIVE)
 }
 
 /// Whether one predicts no worse than another, by the 95 % interval over runs.

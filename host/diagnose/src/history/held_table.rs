@@ -30,6 +30,7 @@ mod round;
 
 use super::campaign::Points;
 use super::criteria::{HELD_NODES, HELD_ORDER, KEPT_ERRORS, MEMORY_KEPT_GAIN, SHORTENED};
+use crate::paired;
 use round::{Round, Smoothing};
 
 /// Where the unknowns stand.
@@ -335,17 +336,9 @@ fn elastic_columns(braid: &Braid<f64>, strokes: &[f64]) -> DMatrix<f64> {
 
 /// Whether left-out runs are predicted better: by a share of their squares, and beyond the scatter of the groups.
 pub(super) fn predicts_better(with: &[f64], without: &[f64]) -> bool {
-    let (gain, error) = gain_by_runs(with, without);
+    let (gain, error) = paired::gain(with, without);
     let before: f64 = without.iter().sum();
     gain > MEMORY_KEPT_GAIN * before && gain > KEPT_ERRORS * error
-}
-
-/// By how much one sum of squares over runs lies below another, and the standard error by runs.
-pub(super) fn gain_by_runs(with: &[f64], without: &[f64]) -> (f64, f64) {
-    let gains: Vec<f64> = without.iter().zip(with).map(|(o, s)| o - s).collect();
-    let (count, gain) = (gains.len() as f64, gains.iter().sum::<f64>());
-    let variance = gains.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0);
-    (gain, (count * variance).sqrt())
 }
 
 impl Solution {

@@ -3,12 +3,14 @@
 //! Each held mounting is predicted without its own recordings ([`unseen_mountings`]). The lengths are named where one length for each mounting
 //! removes most of the squared error, beyond the scatter between mountings, and no other number does so better. Unit of uncertainty: mounting.
 
+use pam_data::statistics::slope;
 use pam_fit::numerics::student::{half_width, half_width_95};
 use pam_fit::stock::{MountingCause, Stock, UnseenMounting, Value, unseen_mountings};
 
 use super::Interval;
 use crate::criteria::judgement::RELEVANT_SIZE;
 use crate::criteria::stock::{FEWEST_MOUNTINGS, GAUGE_ZERO, LENGTH_ALPHA, LENGTH_GAIN, LENGTH_TREND};
+use crate::paired::errors_below;
 
 /// Errors of left-out mountings where each has one number of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,34 +99,36 @@ impl MountedLengths {
 
 /// The lengths of a stock; `None` where no held mounting can be predicted from others.
 pub(super) fn mounted_lengths(fitted: &Stock) -> Option<MountedLengths> {
-    let all = unseen_mountings(&fitted.cells, &fitted.laws, &fitted.fit);
+    let all = unseen_mountings(fitted);
     let count = all.len();
     if count == 0 {
         return None;
     }
     let mean = |of: &dyn Fn(&UnseenMounting) -> f64| all.iter().map(of).sum::<f64>() / count as f64;
-    let scales = Scales::of(fitted);
+    let highest = fitted.cells.list.iter().map(|c| c.pressure).fold(0.0, f64::max);
+    let largest: Vec<f64> = (0..fitted.cells.mountings.len()).map(|m| fitted.cells.largest_of(m)).collect();
     let causes: Vec<CauseError> = MountingCause::ALL
         .iter()
         .enumerate()
         .map(|(k, cause)| {
             let size = mean(&|u| u.number[k].powi(2)).sqrt();
-            let plausible = *cause != MountingCause::GaugeZero || size <= GAUGE_ZERO * scales.highest;
+            let plausible = *cause != MountingCause::GaugeZero || size <= GAUGE_ZERO * highest;
             CauseError { cause: *cause, error: mean(&|u| u.with[k]).sqrt(), size, plausible }
         })
         .collect();
     let relative = |of: &dyn Fn(&UnseenMounting) -> f64| {
-        all.iter().map(|u| of(u).sqrt() / scales.largest[u.member]).collect::<Vec<f64>>()
+        all.iter().map(|u| of(u).sqrt() / largest[u.member]).collect::<Vec<f64>>()
     };
     let before = relative(&|u| u.square);
     let with: Vec<Vec<f64>> = (0..causes.len()).map(|k| relative(&|u| u.with[k])).collect();
     let with_length = &with[MountingCause::Length as usize];
     let left = sum_of_squares(with_length) / sum_of_squares(&before);
-    let t = gain(&before, with_length);
+    // In squares one large error would outweigh all others.
+    let t = errors_below(with_length, &before);
     let enough = half_width(LENGTH_ALPHA, count as f64 - 1.0);
     let quantile = half_width_95(count.saturating_sub(1));
-    let better = |k: usize| gain(with_length, &with[k]) > quantile;
-    let worse = |k: usize| gain(&with[k], with_length) > quantile;
+    let better = |k: usize| errors_below(&with[k], with_length) > quantile;
+    let worse = |k: usize| errors_below(with_length, &with[k]) > quantile;
     let others = || (1..causes.len()).filter(|k| causes[*k].plausible);
     let size = causes[MountingCause::Length as usize].size;
     let std = size / (2.0 * count as f64).sqrt();
@@ -152,35 +156,8 @@ pub(super) fn mounted_lengths(fitted: &Stock) -> Option<MountedLengths> {
     })
 }
 
-/// What errors are compared with.
-struct Scales {
-    /// Largest force of each muscle, N.
-    largest: Vec<f64>,
-    /// The highest pressure, Pa.
-    highest: f64,
-}
-
-impl Scales {
-    fn of(fitted: &Stock) -> Self {
-        let mut largest = vec![f64::MIN_POSITIVE; fitted.cells.mountings.len()];
-        fitted.cells.list.iter().for_each(|c| largest[c.member] = largest[c.member].max(c.force));
-        let highest = fitted.cells.list.iter().map(|c| c.pressure).fold(0.0, f64::max);
-        Self { largest, highest }
-    }
-}
-
 fn sum_of_squares(of: &[f64]) -> f64 {
     of.iter().map(|v| v * v).sum()
-}
-
-/// How many standard errors over the mountings the second errors lie below the first. Root mean squares of mountings are compared: in their
-/// squares one large error would outweigh all others.
-fn gain(before: &[f64], after: &[f64]) -> f64 {
-    let count = before.len() as f64;
-    let gains: Vec<f64> = before.iter().zip(after).map(|(b, a)| b - a).collect();
-    let mean = gains.iter().sum::<f64>() / count;
-    let square: f64 = gains.iter().map(|g| (g - mean).powi(2)).sum();
-    mean / (square / (count - 1.0) / count).sqrt().max(f64::MIN_POSITIVE)
 }
 
 fn of_muscle(all: &[UnseenMounting], m: usize) -> Option<MuscleMountings> {
@@ -213,13 +190,12 @@ fn follow_contraction(all: &[UnseenMounting], fitted: &Stock) -> bool {
             continue;
         }
         for (k, (stroke, length)) in own.iter().enumerate() {
-            let others = || own.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, o)| *o);
-            let count = own.len() as f64 - 1.0;
-            let (x, y) = others().fold((0.0, 0.0), |s, o| (s.0 + o.0 / count, s.1 + o.1 / count));
-            let (xx, xy) =
-                others().fold((0.0, 0.0), |s, o| (s.0 + (o.0 - x).powi(2), s.1 + (o.0 - x) * (o.1 - y)));
+            let others: Vec<(f64, f64)> =
+                own.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, o)| *o).collect();
+            let mean = |of: fn(&(f64, f64)) -> f64| others.iter().map(of).sum::<f64>() / others.len() as f64;
+            let (x, y) = (mean(|o| o.0), mean(|o| o.1));
             by_mean += (length - y).powi(2);
-            by_line += (length - y - xy / xx.max(f64::MIN_POSITIVE) * (stroke - x)).powi(2);
+            by_line += (length - y - slope(&others) * (stroke - x)).powi(2);
         }
     }
     by_line < (1.0 - LENGTH_TREND) * by_mean

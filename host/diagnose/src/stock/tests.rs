@@ -5,7 +5,7 @@ use pam_fit::stock::MountingCause;
 
 const LENGTHS: [f64; 5] = [90.0, 130.0, 180.0, 260.0, 400.0];
 
-/// Staircases of five muscles at four lengths, by a law that is not the model's. Everything of `own` is by muscle and mounting.
+/// Staircases of five muscles at four lengths, by a law that is not the model's. Each error is by muscle and mounting.
 #[derive(Clone, Copy)]
 struct Bench {
     /// Shorter than read, mm.

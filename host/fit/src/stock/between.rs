@@ -92,9 +92,8 @@ fn tried(cells: &StockCells, laws: &[Law]) -> Option<(LawError, StockFit)> {
         .collect::<Option<_>>()?;
     let mut sum = (0.0, 0.0);
     for (m, fit) in without.iter().enumerate() {
-        let own: Vec<_> = cells.list.iter().filter(|c| c.member == m).collect();
-        let largest = own.iter().map(|c| c.force).fold(f64::MIN_POSITIVE, f64::max);
-        for cell in own {
+        let largest = cells.largest_of(m);
+        for cell in cells.list.iter().filter(|c| c.member == m) {
             let model = fit.force(&Place::of(cells, cell));
             sum.0 += ((cell.force - model) / largest).powi(2) / cell.in_half;
             sum.1 += 1.0 / cell.in_half;

@@ -157,6 +157,21 @@ impl StockCells {
         Self { list: self.list.iter().filter(|c| test(c)).copied().collect(), ..self.clone() }
     }
 
+    /// The held mountings of a muscle that may be left out: none of a muscle with a single one.
+    #[must_use]
+    pub fn held_mountings(&self, member: usize) -> Vec<usize> {
+        let own = &self.mountings[member];
+        let held: Vec<usize> = (0..own.len()).filter(|k| own[*k].stroke.is_some()).collect();
+        if held.len() > 1 { held } else { Vec::new() }
+    }
+
+    /// The largest force of a muscle, N; never zero.
+    #[must_use]
+    pub fn largest_of(&self, member: usize) -> f64 {
+        let own = self.list.iter().filter(|c| c.member == member);
+        own.map(|c| c.force).fold(f64::MIN_POSITIVE, f64::max)
+    }
+
     /// The contraction of a cell by the tape measure.
     #[must_use]
     pub fn contraction(&self, cell: &Cell) -> f64 {

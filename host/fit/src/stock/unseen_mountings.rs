@@ -5,10 +5,11 @@
 
 use rayon::prelude::*;
 
-use super::cells::{Cell, StockCells};
+use super::between::Stock;
+use super::cells::Cell;
 use super::criteria::{NUMBER_STEPS, SLOPE_STEP};
 use super::mixed_model::fit;
-use super::{Law, Place, StockFit};
+use super::{Place, StockFit};
 use crate::bench::BenchName;
 
 /// What a mounting may have of its own.
@@ -77,23 +78,15 @@ pub struct UnseenMounting {
 
 /// Every held mounting of a muscle with several, left out in turn. Those recorded in one direction only are not predicted.
 #[must_use]
-pub fn unseen_mountings(cells: &StockCells, laws: &[Law], whole: &StockFit) -> Vec<UnseenMounting> {
-    let held = |m: usize| {
-        let own = &cells.mountings[m];
-        let several = own.iter().filter(|k| k.stroke.is_some()).count() > 1;
-        (0..own.len()).filter(move |k| several && own[*k].stroke.is_some()).map(move |k| (m, k))
-    };
-    let all: Vec<(usize, usize)> = (0..cells.mountings.len()).flat_map(held).collect();
-    all.into_par_iter().filter_map(|(m, k)| unseen(cells, laws, whole, m, k)).collect()
+pub fn unseen_mountings(stock: &Stock) -> Vec<UnseenMounting> {
+    let muscles = 0..stock.cells.mountings.len();
+    let held = |m: usize| stock.cells.held_mountings(m).into_iter().map(move |k| (m, k));
+    let all: Vec<(usize, usize)> = muscles.flat_map(held).collect();
+    all.into_par_iter().filter_map(|(m, k)| unseen(stock, m, k)).collect()
 }
 
-fn unseen(
-    cells: &StockCells,
-    laws: &[Law],
-    whole: &StockFit,
-    member: usize,
-    mounting: usize,
-) -> Option<UnseenMounting> {
+fn unseen(stock: &Stock, member: usize, mounting: usize) -> Option<UnseenMounting> {
+    let cells = &stock.cells;
     let is_it = |c: &Cell| c.member == member && c.mounting == mounting;
     let halves = [1.0, -1.0].map(|direction| {
         let own = cells.list.iter().filter(|c| is_it(c) && c.direction == direction);
@@ -102,7 +95,7 @@ fn unseen(
     if halves.iter().any(Vec::is_empty) {
         return None;
     }
-    let fit = fit(&cells.only(|c| !is_it(c)), laws, Some(whole))?;
+    let fit = fit(&cells.only(|c| !is_it(c)), &stock.laws, Some(&stock.fit))?;
     let square = |half: &[(Place, f64)], cause: MountingCause, number: f64| {
         half.iter().map(|(at, force)| (force - cause.force(&fit, at, number)).powi(2)).sum::<f64>()
             / half.len() as f64
