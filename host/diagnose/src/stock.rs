@@ -257,7 +257,7 @@ fn own(fitted: &Stock, m: usize, member: &Member<'_>, pressure: f64) -> MuscleOw
     let log = Interval::new(own.scale, NORMAL_95);
     let history = history(member.campaign, &member.muscle.geometry());
     let run_in = history.and_then(|h| {
-        h.findings.into_iter().find(|f| f.kind == FindingKind::FirstRunDeficit).map(|f| f.size)
+        h.findings.into_iter().find(|f| f.kind() == FindingKind::FirstRunDeficit).map(|f| f.size)
     });
     MuscleOwn {
         name: member.muscle.name.clone(),

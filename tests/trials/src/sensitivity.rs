@@ -26,23 +26,30 @@ use crate::figures::big_and_visible;
 use crate::ledger::{self, Ledger};
 use crate::score::{self, Outcome};
 
-/// Scale criteria one by one and count false alarms, right classes and changed answers.
+/// The trials that a study answers again and again, and the program that answers.
 #[derive(Args)]
-pub struct Study {
+struct Answering {
     /// A development set: its trials are answered again for each row of the table.
     set: PathBuf,
-    /// Where to.
+    /// Where to; a study that was interrupted there is continued.
     #[arg(short, long)]
     output: PathBuf,
-    /// These criteria only, in this order, each alone; all that decide a verdict otherwise, in groups.
-    #[arg(long, value_name = "NAME")]
-    criterion: Vec<String>,
     /// Longest time for one answer, s.
     #[arg(long, default_value_t = 300)]
     limit: u64,
     /// The program built earlier with `--cfg pam_study`; it is built in the output directory otherwise.
     #[arg(long)]
     host: Option<PathBuf>,
+}
+
+/// Scale criteria one by one and count false alarms, right classes and changed answers.
+#[derive(Args)]
+pub struct Study {
+    #[command(flatten)]
+    answering: Answering,
+    /// These criteria only, in this order, each alone; all that decide a verdict otherwise, in groups.
+    #[arg(long, value_name = "NAME")]
+    criterion: Vec<String>,
     /// Begin no further row after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
@@ -50,6 +57,9 @@ pub struct Study {
     #[arg(long, conflicts_with = "criterion")]
     page: Option<PathBuf>,
 }
+
+/// Without these answers there is nothing to compare with.
+const UNMEASURED: &str = "the answers with the criteria as they are were not measured";
 
 /// Each criterion at half and at double its value.
 const FACTORS: [f64; 2] = [0.5, 2.0];
@@ -187,15 +197,28 @@ fn outcomes(dir: &Path) -> Result<Vec<Outcome>, Box<dyn Error>> {
 
 /// The rows that have been measured, and what has not been for lack of time.
 struct Measurements<'a> {
-    study: &'a Study,
+    answering: &'a Answering,
     host: PathBuf,
     until: Option<Instant>,
 }
 
-impl Measurements<'_> {
+impl<'a> Measurements<'a> {
+    /// Begins or continues a study: measures the answers with the criteria as they are.
+    fn begin(answering: &'a Answering) -> Result<(Self, Row), Box<dyn Error>> {
+        std::fs::create_dir_all(&answering.output)?;
+        let host = answering.host.clone().map_or_else(|| build(&answering.output), Ok)?;
+        let measurements = Self { answering, host, until: None };
+        let nominal = measurements.row(&[], 1.0)?.ok_or(UNMEASURED)?;
+        let begun_with = ledger::read_ledger(&answering.output.join(folder(&[], 1.0)))?.tool;
+        if begun_with != answer::version(&measurements.host) {
+            return Err("this study was begun with another program; name that one with --host, or choose another output directory".into());
+        }
+        Ok((measurements, nominal))
+    }
+
     /// The answers with a group of criteria scaled; read again where they have been measured. None where the time is over.
     fn row(&self, group: &[String], factor: f64) -> Result<Option<Row>, Box<dyn Error>> {
-        let dir = self.study.output.join(folder(group, factor));
+        let dir = self.answering.output.join(folder(group, factor));
         let label = if group.is_empty() { "nominal".to_owned() } else { group.join(",") };
         let kept = dir.join("row.json");
         if let Ok(text) = std::fs::read_to_string(&kept) {
@@ -213,9 +236,9 @@ impl Measurements<'_> {
             return Ok(None);
         }
         let start = Instant::now();
-        share(&self.study.set, &dir)?;
+        share(&self.answering.set, &dir)?;
         if ledger::read_ledger(&dir)?.answers.is_empty() {
-            let limit = Duration::from_secs(self.study.limit);
+            let limit = Duration::from_secs(self.answering.limit);
             let environment = environment(group, factor);
             answer::ask(
                 &dir,
@@ -273,15 +296,7 @@ fn known(names: &[String]) -> Result<(), Box<dyn Error>> {
 pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
     known(&study.criterion)?;
     let until = study.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
-    std::fs::create_dir_all(&study.output)?;
-    let host = study.host.clone().map_or_else(|| build(&study.output), Ok)?;
-    let measurements = Measurements { study, host, until: None };
-    let nominal =
-        measurements.row(&[], 1.0)?.ok_or("the answers with the criteria as they are were not measured")?;
-    let begun_with = ledger::read_ledger(&study.output.join(folder(&[], 1.0)))?.tool;
-    if begun_with != answer::version(&measurements.host) {
-        return Err("this study was begun with another program; name that one with --host, or choose another output directory".into());
-    }
+    let (measurements, nominal) = Measurements::begin(&study.answering)?;
     let measurements = Measurements { until, ..measurements };
     let (names, size) = match study.criterion.as_slice() {
         [] => (all_that_decide(), GROUP),
@@ -298,8 +313,8 @@ pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    let page = page::markdown(&ledger::read_ledger(&study.set)?, &nominal, &rows, &open);
-    std::fs::write(study.output.join("sensitivity.md"), &page)?;
+    let page = page::markdown(&ledger::read_ledger(&study.answering.set)?, &nominal, &rows, &open);
+    std::fs::write(study.answering.output.join("sensitivity.md"), &page)?;
     if let Some(path) = &study.page {
         std::fs::write(path, &page)?;
     }
@@ -337,19 +352,11 @@ mod tests {
     #[test]
     fn a_group_that_changes_an_answer_is_halved_until_one_criterion_does() {
         let output = std::env::temp_dir().join(format!("sensitivity-{}", std::process::id()));
-        let study = Study {
-            set: PathBuf::new(),
-            output: output.clone(),
-            criterion: Vec::new(),
-            limit: 1,
-            host: None,
-            minutes: None,
-            page: None,
-        };
+        let answering = Answering { set: PathBuf::new(), output: output.clone(), limit: 1, host: None };
         let nominal = row("nominal", 1.0, ["leak", "inertia"]);
         let names: Vec<String> = ["A", "B", "C", "D", "E", "F"].map(String::from).to_vec();
         let measured = |group: &[String], named| {
-            let dir = study.output.join(folder(group, 2.0));
+            let dir = answering.output.join(folder(group, 2.0));
             std::fs::create_dir_all(&dir).unwrap();
             let text = serde_json::to_string(&row(&group.join(","), 2.0, named)).unwrap();
             std::fs::write(dir.join("row.json"), text).unwrap();
@@ -360,7 +367,8 @@ mod tests {
         measured(&names[2..4], changed);
         measured(&names[2..3], changed);
         // D and the group of E and F have not been measured, and the time is over.
-        let measurements = Measurements { study: &study, host: PathBuf::new(), until: Some(Instant::now()) };
+        let measurements =
+            Measurements { answering: &answering, host: PathBuf::new(), until: Some(Instant::now()) };
         let mut rows = measurements.screen(&nominal, &names[..4], 2.0).unwrap();
         rows.extend(measurements.screen(&nominal, &names[4..], 2.0).unwrap());
         let found: Vec<_> =

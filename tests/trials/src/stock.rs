@@ -245,18 +245,34 @@ fn mountings(text: &mut String, label: &str, stock: &Value) {
     );
 }
 
-/// The mountings of each muscle. How many muscles there are, and on how many a length lowers the error by 35 % or more.
-fn by_muscle(text: &mut String, label: &str, stock: &Value) -> (usize, usize) {
-    let mut counts = (0, 0);
-    for m in list(stock, &["muscles"]) {
-        let of = |key: &str| number(m, &["unseen_mountings", key]);
-        let (Some(before), Some(after)) = (of("error_N"), of("with_length_N")) else { continue };
-        let change = 100.0 * (after / before - 1.0);
-        counts = (counts.0 + 1, counts.1 + usize::from(change <= -35.0));
-        let name = m.get("muscle").and_then(Value::as_str).unwrap_or("");
-        let _ = writeln!(text, "| {label}, {name} | {before:.2} | {after:.2} | {change:.0} % |");
+/// Errors on the mountings of a muscle that were left out, N.
+struct OwnMountings<'a> {
+    muscle: &'a str,
+    before: f64,
+    with_length: f64,
+}
+
+impl OwnMountings<'_> {
+    /// Percent.
+    fn change(&self) -> f64 {
+        100.0 * (self.with_length / self.before - 1.0)
     }
-    counts
+
+    /// Whether a length lowers the error by 35 % or more.
+    fn is_lower(&self) -> bool {
+        self.change() <= -35.0
+    }
+}
+
+/// The mountings of each muscle.
+fn by_muscle(stock: &Value) -> Vec<OwnMountings<'_>> {
+    let of = |m: &'_ Value, key: &str| number(m, &["unseen_mountings", key]);
+    let muscles = list(stock, &["muscles"]).iter();
+    let own = muscles.filter_map(|m| {
+        let muscle = m.get("muscle").and_then(Value::as_str).unwrap_or("");
+        Some(OwnMountings { muscle, before: of(m, "error_N")?, with_length: of(m, "with_length_N")? })
+    });
+    own.collect()
 }
 
 /// What a stock answers to its muscles.
@@ -278,7 +294,7 @@ impl StockAnswer {
 pub fn answer_of_both_sets(data: &Path, output: &Path, host: &Path) -> Result<StockAnswer, String> {
     let stock = stocks(data, output)?.pop().ok_or("no stock")?;
     let diagnosed = answer(host, &stock, &["diagnose"], &output.join("stock-both.json"))?;
-    let (_, lower) = by_muscle(&mut String::new(), stock.label, &diagnosed);
+    let lower = by_muscle(&diagnosed).iter().filter(|m| m.is_lower()).count();
     let muscles = stock.muscles.len();
     let effects = list(&diagnosed, &["missing"]).iter().filter_map(|m| m.get("effect")?.as_str());
     let named = effects.map(|e| (e.to_owned(), if e == CAUSES[0] { lower } else { muscles })).collect();
@@ -296,10 +312,22 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         let diagnosed = answer(host, &stock, &["diagnose"], &output.join(format!("stock-{label}.json")))?;
         laws(&mut parts[0], label, &diagnosed);
         mountings(&mut parts[1], label, &diagnosed);
-        let (all, lower) = by_muscle(&mut muscles, label, &diagnosed);
+        let own = by_muscle(&diagnosed);
+        for m in &own {
+            let _ = writeln!(
+                muscles,
+                "| {label}, {} | {:.2} | {:.2} | {:.0} % |",
+                m.muscle,
+                m.before,
+                m.with_length,
+                m.change()
+            );
+        }
         let _ = writeln!(
             counts,
-            "- {label}: a length for each mounting lowers the error by 35 % or more on {lower} of {all} muscles."
+            "- {label}: a length for each mounting lowers the error by 35 % or more on {} of {} muscles.",
+            own.iter().filter(|m| m.is_lower()).count(),
+            own.len()
         );
         shared(&mut parts[2], label, &diagnosed);
         let low = |key: &str| shown(number(&diagnosed, &["shared", "first_run_low", key]), 1);

@@ -152,8 +152,6 @@ pub enum FindingKind {
 /// Something documented of such muscles, as these recordings show it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What it is about.
-    pub kind: FindingKind,
     /// Whether its interval excludes zero, or its rule holds.
     pub found: bool,
     /// Its size.
@@ -174,7 +172,23 @@ pub struct Finding {
     pub detail: FindingDetail,
 }
 
-/// What is known of a finding beyond its size, by its kind.
+impl Finding {
+    /// What it is about.
+    #[must_use]
+    pub fn kind(&self) -> FindingKind {
+        match self.detail {
+            FindingDetail::FirstRun { .. } => FindingKind::FirstRunDeficit,
+            FindingDetail::Creep { .. } => FindingKind::Creep,
+            FindingDetail::Gap(_) => FindingKind::FillingEmptyingGap,
+            FindingDetail::Shift { lasts: true, .. } => FindingKind::Slip,
+            FindingDetail::Shift { lasts: false, .. } => FindingKind::BadRun,
+            FindingDetail::LoadedBefore => FindingKind::LoadedBefore,
+            FindingDetail::SlackReading { .. } => FindingKind::SlackReading,
+        }
+    }
+}
+
+/// What a finding is about, and what is known of it beyond its size.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FindingDetail {
     /// Of a first-run deficit.
@@ -191,9 +205,11 @@ pub enum FindingDetail {
     },
     /// Of a gap between filling and emptying; absent where it is not found, or no memory is named.
     Gap(Option<GapBesideMemory>),
-    /// Of a slip or a bad run: how much shorter than at full length its mounting is held, mm.
+    /// Of a slip or a bad run.
     Shift {
-        /// In mm.
+        /// Whether it lasts until the end of the mounting: a slip.
+        lasts: bool,
+        /// How much shorter than at full length the mounting is held, mm.
         shortened_mm: f64,
     },
     /// Of a load before the first run.
@@ -350,6 +366,6 @@ pub struct History {
 impl History {
     /// The findings of one kind.
     pub fn of(&self, kind: FindingKind) -> impl Iterator<Item = &Finding> {
-        self.findings.iter().filter(move |f| f.kind == kind)
+        self.findings.iter().filter(move |f| f.kind() == kind)
     }
 }

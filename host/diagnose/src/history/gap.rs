@@ -3,9 +3,7 @@
 use model_core::effects::EffectName;
 
 use super::Fits;
-use super::answer::{
-    Estimate, Finding, FindingDetail, FindingKind, GapBesideMemory, InPlaceOfMemory, NeededEffect,
-};
+use super::answer::{Estimate, Finding, FindingDetail, GapBesideMemory, InPlaceOfMemory, NeededEffect};
 use super::campaign::Points;
 use super::criteria::GAP_EXPLAINED;
 use super::findings::{self, Contrast, Visits};
@@ -38,7 +36,6 @@ pub(super) fn finding(points: &Points, fits: &Fits<'_>, visits: &Visits, named: 
     let beside_memory = || GapBesideMemory { left, beside: beside(fits), instead: instead(points, fits) };
     let alternatives = if cause.is_some() && named { fits.instead.alternatives.clone() } else { Vec::new() };
     Some(Finding {
-        kind: FindingKind::FillingEmptyingGap,
         found,
         size: Estimate::new(contrast.mean, contrast.half, "N", of),
         units: contrast.units,

@@ -2,8 +2,8 @@
 
 use super::Fits;
 use super::answer::{
-    Course, ErrorSize, Estimate, Finding, FindingDetail, FindingKind, History, LayerName, LayerShare,
-    MemoryLaw, MemoryRefusal, Mounting, RunError, StaticCurve, UnseenRuns,
+    Course, ErrorSize, Estimate, Finding, FindingDetail, History, LayerName, LayerShare, MemoryLaw,
+    MemoryRefusal, Mounting, RunError, StaticCurve, UnseenRuns,
 };
 use super::campaign::Points;
 use super::criteria::{JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES};
@@ -172,7 +172,6 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             2.0 * e.error
         };
         Finding {
-            kind: if e.lasts { FindingKind::Slip } else { FindingKind::BadRun },
             found: e.sure,
             size: Estimate::new(e.shift, Some(half), "kPa", "run"),
             units: points.mountings[e.mounting].runs.len(),
@@ -181,14 +180,16 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
             alternatives: Vec::new(),
             mounting: Some(e.mounting + 1),
             run: Some(e.run),
-            detail: FindingDetail::Shift { shortened_mm: 1e3 * points.mountings[e.mounting].stroke },
+            detail: FindingDetail::Shift {
+                lasts: e.lasts,
+                shortened_mm: 1e3 * points.mountings[e.mounting].stroke,
+            },
         }
     }));
     found.extend(fits.slack_reading.as_ref().map(SlackReading::finding));
     let loaded = fits.best().0.choice.loaded;
     if named && loaded >= JUDGE_LOADED_LONG {
         found.push(Finding {
-            kind: FindingKind::LoadedBefore,
             found: true,
             size: Estimate::new(loaded, None, "s", "run"),
             units: 0,
@@ -218,7 +219,6 @@ fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> 
     let (_, unseen) = fits.best();
     let left = findings::first_run_left(points, &unseen.predicted);
     Some(Finding {
-        kind: FindingKind::FirstRunDeficit,
         found,
         size: estimate(&deficit, "mounting"),
         units: deficit.units,
@@ -236,7 +236,6 @@ fn creep(points: &Points, fits: &Fits<'_>, named: bool, half: f64) -> Finding {
     let share = law.fit.theta[0];
     let plateau = findings::plateau_creep(points).filter(|p| p.units > 2);
     Finding {
-        kind: FindingKind::Creep,
         found: named,
         size: Estimate::new(share, Some(half), "", "run"),
         units: points.runs.len(),

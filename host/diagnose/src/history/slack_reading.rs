@@ -10,7 +10,7 @@ use pam_data::statistics;
 use pam_fit::bench::{BenchName, Candidate};
 use pam_fit::numerics::median;
 
-use super::answer::{Estimate, Finding, FindingDetail, FindingKind};
+use super::answer::{Estimate, Finding, FindingDetail};
 use super::campaign::Points;
 use super::criteria::{
     PULLS, RAMP, SLACK_FLAT, SLACK_FOLLOWS, SLACK_KNEE, SLACK_PART, SLACK_POINTS, SLACK_RANGE,
@@ -183,7 +183,6 @@ impl SlackReading {
     /// As a finding.
     pub(super) fn finding(&self) -> Finding {
         Finding {
-            kind: FindingKind::SlackReading,
             found: self.found,
             size: Estimate::new(self.mean.mean, self.mean.half, "N", "mounting"),
             units: self.mean.units,

@@ -280,7 +280,7 @@ fn run(r: &RunError) -> RunDocument<'_> {
 
 fn finding(f: &Finding) -> FindingDocument<'_> {
     FindingDocument {
-        kind: match f.kind {
+        kind: match f.kind() {
             FindingKind::FirstRunDeficit => FindingName::FirstRunDeficit,
             FindingKind::Creep => FindingName::Creep,
             FindingKind::FillingEmptyingGap => FindingName::FillingEmptyingGap,

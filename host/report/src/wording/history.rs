@@ -1,7 +1,7 @@
 //! The findings of a history as text, and why no memory is named.
 
 use pam_diagnose::history::answer::{
-    Estimate, Finding, FindingDetail, FindingKind, GapBesideMemory, LayerName, MemoryRefusal, StaticCurve,
+    Estimate, Finding, FindingDetail, GapBesideMemory, LayerName, MemoryRefusal, StaticCurve,
 };
 
 /// A finding as text without its full stop.
@@ -11,7 +11,7 @@ pub(crate) fn finding(of: &Finding) -> String {
         FindingDetail::FirstRun { left } => first_run(of, *left),
         FindingDetail::Creep { decades, plateau } => creep(of, *decades, plateau.as_ref()),
         FindingDetail::Gap(beside) => gap(of, beside.as_ref()),
-        FindingDetail::Shift { shortened_mm } => shift(of, *shortened_mm),
+        FindingDetail::Shift { lasts, shortened_mm } => shift(of, *lasts, *shortened_mm),
         FindingDetail::LoadedBefore => format!(
             "the muscle had been loaded for about {:.0} s before the first recorded run: a smaller first-run deficit is to be expected (chosen on a \
              grid, weakly known)",
@@ -134,8 +134,7 @@ fn beside_memory(of: &GapBesideMemory) -> String {
     left + &beside + &instead
 }
 
-fn shift(of: &Finding, shortened_mm: f64) -> String {
-    let lasts = of.kind == FindingKind::Slip;
+fn shift(of: &Finding, lasts: bool, shortened_mm: f64) -> String {
     format!(
         "mounting {} (shortened by {shortened_mm:.1} mm), run {}: {} shift of {:+.1} ± {:.1} kPa against the other runs; {}",
         of.mounting.unwrap_or_default(),

@@ -6,25 +6,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Measurements, Row, Study, build, folder, known};
-use crate::answer;
+use super::{Answering, Measurements, Row, UNMEASURED, known};
 use crate::ledger::{self, Ledger};
 use crate::rate::Rate;
 
 /// Leave each rule of the diagnosis out once, and count false alarms, right classes and changed answers.
 #[derive(Args)]
 pub struct Ablation {
-    /// A development set: its trials are answered again for each row of the table.
-    set: PathBuf,
-    /// Where to; that of a study of sensitivities with the same program is continued.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Longest time for one answer, s.
-    #[arg(long, default_value_t = 300)]
-    limit: u64,
-    /// The program built earlier with `--cfg pam_study`; it is built in the output directory otherwise.
-    #[arg(long)]
-    host: Option<PathBuf>,
+    #[command(flatten)]
+    answering: Answering,
     /// Write the table as this page of the book, too.
     #[arg(long)]
     page: Option<PathBuf>,
@@ -66,32 +56,15 @@ const fn rule(what: &'static str, criteria: &'static [&'static str], factor: f64
 
 /// Runs the ablation and writes `ablation.md`.
 pub fn run(ablation: &Ablation) -> Result<(), Box<dyn Error>> {
-    std::fs::create_dir_all(&ablation.output)?;
-    let study = Study {
-        set: ablation.set.clone(),
-        output: ablation.output.clone(),
-        criterion: Vec::new(),
-        limit: ablation.limit,
-        host: None,
-        minutes: None,
-        page: None,
-    };
-    let host = ablation.host.clone().map_or_else(|| build(&study.output), Ok)?;
-    let measurements = Measurements { study: &study, host, until: None };
-    let unfinished = "the answers were not measured";
-    let nominal = measurements.row(&[], 1.0)?.ok_or(unfinished)?;
-    let begun_with = ledger::read_ledger(&study.output.join(folder(&[], 1.0)))?.tool;
-    if begun_with != answer::version(&measurements.host) {
-        return Err("the output directory holds answers of another program; choose another one".into());
-    }
+    let (measurements, nominal) = Measurements::begin(&ablation.answering)?;
     let mut rows = Vec::new();
     for rule in &RULES {
         let group: Vec<String> = rule.criteria.iter().map(|c| (*c).to_owned()).collect();
         known(&group)?;
-        rows.push((rule, measurements.row(&group, rule.factor)?.ok_or(unfinished)?));
+        rows.push((rule, measurements.row(&group, rule.factor)?.ok_or(UNMEASURED)?));
     }
-    let page = markdown(&ledger::read_ledger(&study.set)?, &nominal, &rows);
-    std::fs::write(study.output.join("ablation.md"), &page)?;
+    let page = markdown(&ledger::read_ledger(&ablation.answering.set)?, &nominal, &rows);
+    std::fs::write(ablation.answering.output.join("ablation.md"), &page)?;
     if let Some(path) = &ablation.page {
         std::fs::write(path, &page)?;
     }
