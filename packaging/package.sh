@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Packages of the host program: a static Linux binary in an archive, a Debian package, a Homebrew formula, or the archive of a binary that
-# was built elsewhere. Each contains both names of the program, shell completions, manual pages, and the licences.
+# was built elsewhere (for Windows a ZIP file). Each contains both names of the program, shell completions, manual pages, and the licences.
 #
 # Beside them it writes the bill of materials (CycloneDX, also inside each package) and the provenance (in-toto) of the packages.
 #
@@ -47,7 +47,7 @@ trap 'rm -rf "$work"' EXIT
 name="pam-$version-$platform"
 tree="$work/$name"
 mkdir -p "$tree/bin" "$tree/share/man/man1" "$tree/share/bash-completion/completions" "$tree/share/zsh/site-functions" \
-    "$tree/share/fish/vendor_completions.d" "$tree/share/doc/pam"
+    "$tree/share/fish/vendor_completions.d" "$tree/share/powershell" "$tree/share/doc/pam"
 install -m 755 "$binary" "$tree/bin/host$suffix"
 # One file under two names: the program looks at the name by which it was called.
 if [ -z "$suffix" ]; then ln "$tree/bin/host" "$tree/bin/pam"; else cp "$tree/bin/host$suffix" "$tree/bin/pam$suffix"; fi
@@ -56,6 +56,7 @@ for called in host pam; do
     "$work/$called" completions bash > "$tree/share/bash-completion/completions/$called"
     "$work/$called" completions zsh > "$tree/share/zsh/site-functions/_$called"
     "$work/$called" completions fish > "$tree/share/fish/vendor_completions.d/$called.fish"
+    "$work/$called" completions powershell > "$tree/share/powershell/$called.ps1"
 done
 "$work/pam" --quiet man -o "$tree/share/man/man1"
 cp LICENSE-APACHE LICENSE-MIT README.md CHANGELOG.md "$tree/share/doc/pam/"
@@ -64,8 +65,13 @@ echo "$version" > "$tree/share/doc/pam/VERSION"
 python3 packaging/sbom.py ${target:+--target "$target"} --output "$tree/share/doc/pam/sbom.cdx.json"
 
 mkdir -p "$output"
-tar -C "$work" --owner=0 --group=0 --sort=name -czf "$output/$name.tar.gz" "$name"
-sum=$(sha256sum "$output/$name.tar.gz" | cut -d' ' -f1)
+if [ -n "$suffix" ]; then
+    archive="$name.zip"
+    python3 packaging/zip.py "$tree" "$output/$archive"
+else
+    archive="$name.tar.gz"
+    tar -C "$work" --owner=0 --group=0 --sort=name -czf "$output/$archive" "$name"
+fi
 
 if [ "$deb" = yes ] && [ -z "$suffix" ] && [ "${platform%%-*}" = linux ]; then
     # `host` belongs to another Debian package (bind9-host): only `pam` is installed beside it.
@@ -74,7 +80,7 @@ if [ "$deb" = yes ] && [ -z "$suffix" ] && [ "${platform%%-*}" = linux ]; then
     cp "$tree/bin/pam" "$root/usr/bin/pam"
     cp -r "$tree/share" "$root/usr/share"
     rm "$root/usr/share/bash-completion/completions/host" "$root/usr/share/zsh/site-functions/_host" \
-        "$root/usr/share/fish/vendor_completions.d/host.fish"
+        "$root/usr/share/fish/vendor_completions.d/host.fish" "$root/usr/share/powershell/host.ps1"
     commands=$("$work/pam" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' | paste -sd'|')
     sed -i -E "s/(^|[^a-z])host ($commands)([^a-z]|$)/\1pam \2\3/g" "$root/usr/share/doc/pam/README.md"
     gzip -9n "$root"/usr/share/man/man1/*.1
@@ -103,10 +109,13 @@ CONTROL
     dpkg-deb --root-owner-group --build "$root" "$output/pam_${version}_$arch.deb" > /dev/null
 fi
 
-sed -e "s/@VERSION@/$version/g" -e "s/@SHA256@/$sum/g" -e "s/@ARCHIVE@/$name.tar.gz/g" packaging/pam.rb.in > "$output/pam.rb"
+if [ -z "$suffix" ]; then
+    sum=$(sha256sum "$output/$archive" | cut -d' ' -f1)
+    sed -e "s/@VERSION@/$version/g" -e "s/@SHA256@/$sum/g" -e "s/@ARCHIVE@/$archive/g" packaging/pam.rb.in > "$output/pam.rb"
+fi
 cp "$tree/share/doc/pam/sbom.cdx.json" "$output/$name.sbom.cdx.json"
-packages=("$output/$name.tar.gz")
+packages=("$output/$archive")
 if [ -n "${arch:-}" ]; then packages+=("$output/pam_${version}_$arch.deb"); fi
 python3 packaging/provenance.py --platform "$platform" ${target:+--target "$target"} --output "$output/$name.provenance.json" \
     "${packages[@]}"
-echo "$output/$name.tar.gz"
+echo "$output/$archive"

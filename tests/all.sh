@@ -198,6 +198,13 @@ if [ $tier = long ]; then
     if require "batch in a bucket" python3 python3 python3-venv; then
         step "batch in a bucket" env PAM_LONG=1 bash tests/fleet/run.sh
     fi
+    if has rustup && require "package for Windows" x86_64-w64-mingw32-gcc gcc-mingw-w64-x86-64 &&
+        require "package for Windows" wine wine wine64 && require "package for Windows" python3 python3; then
+        step "package for Windows" packaging/windows.sh --output "$(mktemp -d)"
+    fi
+    if has rustup && require "compiled for macOS" python3 python3 python3-venv; then
+        step "compiled for macOS" packaging/check-macos.sh
+    fi
     if has cargo-llvm-cov; then
         step "coverage" bash tests/coverage.sh
     else

@@ -13,6 +13,7 @@ use crate::console::{Colour, Console, printable, unprinted};
 use crate::program_name;
 use crate::settings::{all_settings, apply};
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::output::reader_left;
 
 /// Recordings of pneumatic artificial muscles to tables, tables to controllers.
 #[derive(Debug, Parser)]
@@ -198,7 +199,7 @@ fn ended(words: &clap::Error) -> Error {
         Cow::Owned(text) => std::io::stderr().write_all(text.as_bytes()),
     };
     match printed {
-        Err(e) if !words.use_stderr() && e.kind() != std::io::ErrorKind::BrokenPipe => {
+        Err(e) if !words.use_stderr() && !reader_left(&e) => {
             Error::new(DataCode::FileUnwritable, format!("standard output cannot be written: {e}"))
         }
         _ => std::process::exit(words.exit_code()),

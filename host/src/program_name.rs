@@ -26,6 +26,8 @@ fn of(argument: Option<&OsStr>) -> &'static str {
 #[must_use]
 pub(crate) fn renamed(command: clap::Command) -> clap::Command {
     let name = called();
+    // The parser would show the file's name, on Windows with its `.exe`.
+    let command = command.bin_name(name);
     if name == WRITTEN { command } else { with_name(command.name(name), name) }
 }
 
@@ -97,6 +99,14 @@ mod tests {
             [of("/usr/bin/pam"), of("pam.exe"), of("host"), of("./renamed")],
             ["pam", "pam", "host", "host"]
         );
+    }
+
+    #[test]
+    fn the_usage_shows_the_name_without_the_ending_of_the_file() {
+        let shown =
+            renamed(clap::Command::new(WRITTEN)).try_get_matches_from(["C:/tools/host.exe", "--help"]);
+        let usage = shown.expect_err("help is an early end").to_string();
+        assert!(usage.contains("Usage: host\n"), "{usage}");
     }
 
     #[test]

@@ -68,11 +68,20 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn print(bytes: &[u8]) -> Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+        Err(e) if !reader_left(&e) => {
             Err(Error::new(DataCode::FileUnwritable, format!("standard output cannot be written: {e}")))
         }
         _ => Ok(()),
     }
+}
+
+/// Whether a write to standard output failed because its reader stopped reading.
+#[must_use]
+pub fn reader_left(error: &io::Error) -> bool {
+    /// A second code that Windows has for it; the standard library only knows `ERROR_NO_DATA` and `ERROR_BROKEN_PIPE`.
+    const ERROR_PIPE_NOT_CONNECTED: i32 = 233;
+    error.kind() == io::ErrorKind::BrokenPipe
+        || (cfg!(windows) && error.raw_os_error() == Some(ERROR_PIPE_NOT_CONNECTED))
 }
 
 /// Files without a name, which vanish with the program that writes them: Linux has them on most of its file systems.

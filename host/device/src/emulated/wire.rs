@@ -2,7 +2,7 @@
 //!
 //! The board sends byte by byte, and each byte is a system call. Into a named pipe it costs a tenth of what it costs into a TCP
 //! connection. A pipe that is not read for a while holds a second of telemetry; a connection holds some tens of milliseconds, because
-//! most of its buffer goes to the headers of one-byte packets. On systems without named pipes the line is a TCP connection.
+//! most of its buffer goes to the headers of one-byte packets. Systems other than Linux use a TCP connection.
 
 use std::io::{self, Read, Write};
 use std::net::TcpListener;
@@ -68,7 +68,7 @@ pub fn listener() -> io::Result<(TcpListener, u16)> {
 ///
 /// # Errors
 /// As text: it has ended, does not connect within 20 s, or the port is broken.
-#[cfg(not(unix))]
+#[cfg(not(target_os = "linux"))]
 fn accept(listener: &TcpListener, child: &mut Child) -> Result<std::net::TcpStream, String> {
     let stream = until_there(child, || {
         listener.set_nonblocking(true)?;
@@ -88,13 +88,13 @@ fn accept(listener: &TcpListener, child: &mut Child) -> Result<std::net::TcpStre
 /// A line that QEMU has yet to open.
 #[derive(Debug)]
 pub struct Wire {
-    #[cfg(unix)]
+    #[cfg(target_os = "linux")]
     path: std::path::PathBuf,
-    #[cfg(not(unix))]
+    #[cfg(not(target_os = "linux"))]
     listener: (TcpListener, u16),
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 impl Wire {
     /// A line of a name; what it needs lies in a folder, and is removed with that.
     ///
@@ -141,7 +141,7 @@ impl Wire {
     }
 }
 
-#[cfg(not(unix))]
+#[cfg(not(target_os = "linux"))]
 impl Wire {
     /// A line; its folder and name are needed elsewhere only.
     ///
