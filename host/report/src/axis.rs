@@ -5,6 +5,8 @@
 pub enum Scale {
     /// Equal steps are equally far apart.
     Linear,
+    /// Equal steps are equally far apart, and only whole numbers exist: runs, recordings.
+    Whole,
     /// Equal ratios are equally far apart; numbers that are not positive are not drawn.
     Log,
     /// Named places 0, 1, 2, … for bars.
@@ -36,6 +38,11 @@ impl Axis {
     /// A linear axis.
     pub fn new(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { label: label.into(), unit: unit.into(), scale: Scale::Linear, range: None, zero: false }
+    }
+
+    /// A linear axis of something that is counted.
+    pub fn whole(label: impl Into<String>) -> Self {
+        Self { scale: Scale::Whole, ..Self::new(label, "") }
     }
 
     /// A logarithmic axis.
@@ -79,7 +86,7 @@ impl Axis {
             }
             (_, Scale::Names(names)) => return (-0.5, names.len().max(1) as f64 - 0.5),
             (_, Scale::Log) => return log_ends(data),
-            (_, Scale::Linear) => data.unwrap_or((0.0, 1.0)),
+            (_, Scale::Linear | Scale::Whole) => data.unwrap_or((0.0, 1.0)),
         };
         let (mut low, mut high) = (low, high);
         if self.zero {
@@ -138,6 +145,18 @@ pub(crate) fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
             Tick { at, text }
         })
         .collect()
+}
+
+/// Ticks of a linear axis at whole numbers only.
+pub(crate) fn whole_ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {
+    let mut ticks = linear_ticks(low, high, wanted);
+    ticks.retain(|tick| (tick.at - tick.at.round()).abs() < 1e-6);
+    for tick in &mut ticks {
+        if tick.text.contains('.') {
+            tick.text = fixed(tick.at.round(), 0);
+        }
+    }
+    ticks
 }
 
 /// Ticks of a logarithmic axis: whole decades written, and 2 and 5 as well where there are few decades.
@@ -265,6 +284,13 @@ mod tests {
         assert_eq!(texts(&linear_ticks(-45.0, 45.0, 2)), ["−40", "−20", "0", "20", "40"]);
         assert!(linear_ticks(1.0, 1.0, 5).is_empty());
         assert!(linear_ticks(f64::NAN, 1.0, 5).is_empty());
+    }
+
+    #[test]
+    fn what_is_counted_has_whole_ticks() {
+        assert_eq!(texts(&whole_ticks(0.92, 3.08, 5)), ["1", "2", "3"]);
+        assert_eq!(texts(&whole_ticks(0.7, 8.3, 4)), ["2", "4", "6", "8"]);
+        assert_eq!(texts(&whole_ticks(0.95, 1.05, 4)), ["1"]);
     }
 
     #[test]

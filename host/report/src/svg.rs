@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use super::axis::{Scale, Tick, linear_ticks, log_ticks};
+use super::axis::{Scale, Tick, linear_ticks, log_ticks, whole_ticks};
 use super::canvas::{FONT_SIZE, Frame, px, text};
 use super::colour::{self, Colour};
 use super::figure::{Figure, Panel};
@@ -80,6 +80,7 @@ fn ends(figure: &Figure, vertical: bool) -> Vec<(f64, f64)> {
 fn ticks(axis: &super::axis::Axis, ends: (f64, f64), wanted: usize) -> Vec<Tick> {
     match &axis.scale {
         Scale::Linear => linear_ticks(ends.0, ends.1, wanted),
+        Scale::Whole => whole_ticks(ends.0, ends.1, wanted),
         Scale::Log => log_ticks(ends.0, ends.1, wanted),
         Scale::Names(names) => {
             names.iter().enumerate().map(|(i, name)| Tick { at: i as f64, text: name.clone() }).collect()

@@ -64,7 +64,7 @@ fn parameters(h: &History) -> Table {
 fn run_in(h: &History) -> Figure {
     let panel = |title: &str, after: bool| {
         let mut panel = Panel::new(
-            Axis::new("run within the mounting", ""),
+            Axis::whole("run within the mounting"),
             Axis::new("measured less predicted, filling", "N"),
         )
         .titled(title);

@@ -32,17 +32,20 @@ const DIRECTIONS: [&str; 2] = ["lengthening", "shortening"];
 fn along(d: &Diagnosis, p: &Profile) -> Panel {
     let (name, unit, scale, offset) = shown(p);
     let region = d.r#where.iter().find(|r| r.coordinate == p.coordinate);
-    let (axis, x, region): (Axis, Vec<f64>, _) =
-        if p.coordinate == "direction" && p.at.len() == DIRECTIONS.len() {
-            // A sign is not a number to read off: two places with names.
-            let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
-            let places = (0..DIRECTIONS.len()).map(|i| i as f64).collect();
-            let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
-            (Axis::names("", DIRECTIONS.map(String::from).to_vec()), places, region)
-        } else {
-            let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
-            (Axis::new(name.clone(), unit), p.at.iter().map(|v| scale * v + offset).collect(), region)
-        };
+    let (axis, x, region): (Axis, Vec<f64>, _) = if p.coordinate == "direction"
+        && p.at.len() == DIRECTIONS.len()
+    {
+        // A sign is not a number to read off: two places with names.
+        let half = |sign: f64| if sign < 0.0 { 0.0 } else { 1.0 };
+        let places = (0..DIRECTIONS.len()).map(|i| i as f64).collect();
+        let region = region.map(|r| (half(r.from) - 0.5, half(r.to) + 0.5));
+        (Axis::names("", DIRECTIONS.map(String::from).to_vec()), places, region)
+    } else {
+        let region = region.map(|r| (scale * r.from + offset, scale * r.to + offset));
+        // What has no unit is counted: recordings, runs, levels.
+        let axis = if unit.is_empty() { Axis::whole(name.clone()) } else { Axis::new(name.clone(), unit) };
+        (axis, p.at.iter().map(|v| scale * v + offset).collect(), region)
+    };
     let mut panel = Panel::new(axis, Axis::new("residual", "N").from_zero())
         .titled(name)
         .line("rms", Colour::Series(1), &x, &p.rms_before)

@@ -61,6 +61,11 @@ fn newtons(of: &Estimate) -> String {
     )
 }
 
+/// Why a finding does not hold; an estimate of one unit has no interval.
+fn includes_zero(of: &Finding) -> String {
+    of.size.half().map_or_else(String::new, |_| "; its interval includes zero".to_owned())
+}
+
 fn first_run(of: &Finding, left: Option<f64>) -> String {
     let rest = match (of.found, left) {
         (true, Some(left)) => format!(
@@ -68,7 +73,7 @@ fn first_run(of: &Finding, left: Option<f64>) -> String {
             -left
         ),
         (true, None) => String::new(),
-        (false, _) => "; its interval includes none".to_owned(),
+        (false, _) => includes_zero(of),
     };
     format!(
         "the first filling of a mounting pulls {} less than the second ({} shortened mountings){rest}",
@@ -92,7 +97,7 @@ fn creep(of: &Finding, decades: usize, plateau: Option<&Estimate>) -> String {
 
 fn gap(of: &Finding, beside: Option<&GapBesideMemory>) -> String {
     let rest = match (of.found, beside) {
-        (false, _) => "; its interval includes none".to_owned(),
+        (false, _) => includes_zero(of),
         (true, None) => String::new(),
         (true, Some(known)) => beside_memory(known),
     };
