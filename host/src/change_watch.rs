@@ -54,7 +54,7 @@ pub enum Update {
 impl Update {
     /// As one line.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         let report = match self {
             Self::Waiting(why) => return format!("no comparison yet: {why}"),
             Self::Answer(report) => report,
@@ -349,8 +349,8 @@ mod tests {
     #[test]
     fn nothing_is_named_where_nothing_changed() {
         let update = watched(1.0);
-        assert_eq!(update.names(), Some(Vec::new()), "{}", update.words());
-        assert!(update.words().starts_with("Nothing changed"), "{}", update.words());
+        assert_eq!(update.names(), Some(Vec::new()), "{}", update.description());
+        assert!(update.description().starts_with("Nothing changed"), "{}", update.description());
     }
 
     #[test]
@@ -361,7 +361,7 @@ mod tests {
             watch.push(&sample(tick, 1.0, &mut noise));
         }
         watch.push(&Telemetry { time_us: 5_000_000, state: State::Disarmed, ..Telemetry::default() });
-        let words = watch.finish().expect("rows").words();
+        let words = watch.finish().expect("rows").description();
         assert!(words.contains("20 s needed"), "{words}");
     }
 }

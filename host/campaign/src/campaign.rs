@@ -128,7 +128,7 @@ pub fn run(
     // One that ended at its limit continues where the limit is higher now.
     let more = engine.budget() - spent > LEAST_MORE_S;
     if let Some(Event::Ended { reason, .. }) = journal.events().last()
-        && !(more && reason.starts_with(crate::words::TIME_IS_OVER))
+        && !(more && reason.starts_with(crate::wording::TIME_IS_OVER))
     {
         return Ok((Outcome::Complete(reason.clone()), course));
     }

@@ -23,7 +23,7 @@ pub use crate::purpose::Purpose;
 use crate::rig::Rig;
 use crate::step::{CheckKind, Step};
 use crate::watch::Spoiled;
-use crate::words;
+use crate::wording;
 
 /// What to do next.
 #[derive(Debug, Clone, PartialEq)]
@@ -175,16 +175,16 @@ impl Engine {
             if closed || left < 0.0 {
                 Decision::Stop(reason)
             } else {
-                chosen(CLOSING, words::CLOSING.to_owned(), Gain::default(), closing)
+                chosen(CLOSING, wording::CLOSING.to_owned(), Gain::default(), closing)
             }
         };
         if settled {
-            return Ok(close(words::settled(self.diagnosis.as_ref(), self.purpose)));
+            return Ok(close(wording::settled(self.diagnosis.as_ref(), self.purpose)));
         }
         Ok(match best {
             Some(Weighed { step, gain, seconds }) => chosen(step, self.reason(&step, &gain), gain, seconds),
-            None if left < self.shortest() => close(words::time_is_over(self.budget_s)),
-            None => close(words::NOTHING_MORE.to_owned()),
+            None if left < self.shortest() => close(wording::time_is_over(self.budget_s)),
+            None => close(wording::NOTHING_MORE.to_owned()),
         })
     }
 
@@ -254,13 +254,13 @@ impl Engine {
     pub fn learn(&mut self, spent_s: f64) -> Result<String> {
         let before = self.findings.as_ref().map(|f| f.fit.summary.deadband_kPa);
         self.fit();
-        let mut finding = words::table(before, self.findings.as_ref());
+        let mut finding = wording::table(before, self.findings.as_ref());
         let due = self.since_diagnosis >= DIAGNOSE_EVERY && spent_s >= DIAGNOSE_FROM;
         if due && self.purpose != Purpose::Fit && self.findings.is_some() {
             let earlier = self.diagnosis.as_ref().map(names);
             self.diagnose()?;
             if let Some(d) = &self.diagnosis {
-                finding += &words::diagnosis(earlier.as_deref(), d);
+                finding += &wording::diagnosis(earlier.as_deref(), d);
             }
         }
         Ok(finding)

@@ -47,4 +47,4 @@ pub mod rig;
 pub mod step;
 pub mod stroke_axis;
 pub mod watch;
-pub mod words;
+pub mod wording;

@@ -166,7 +166,7 @@ impl Step {
 
     /// As text.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         let kpa = |p: f64| format!("{:.0} kPa", p * 1e-3);
         match *self {
             Self::Tare { seconds } => format!("vented at rest length for {seconds:.0} s"),

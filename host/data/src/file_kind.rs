@@ -84,7 +84,7 @@ impl FileKind {
 
     /// Its common name.
     #[must_use]
-    pub fn words(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Self::Muscle => "a muscle's description",
             Self::Import => "an import description",
@@ -115,7 +115,7 @@ impl FileKind {
     pub fn wanted(self, path: &Path, error: Error) -> Error {
         match Self::of_file(path) {
             Some(found) if found != self => {
-                let cause = format!("this is {}, not {}", found.words(), self.words());
+                let cause = format!("this is {}, not {}", found.description(), self.description());
                 let swapped = Error::new(self.code(), cause).file(path);
                 if error.code() == self.code() && error.advised() && error.place().line.is_none() {
                     let advice = error.advice().unwrap_or_default().to_owned();

@@ -30,7 +30,7 @@ pub mod kind {
 
 /// Kind and length of a record, from its first nine bytes.
 #[must_use]
-pub fn head(bytes: &[u8]) -> Option<(u8, u64)> {
+pub fn header(bytes: &[u8]) -> Option<(u8, u64)> {
     let (&kind, rest) = bytes.split_first()?;
     Some((kind, u64::from_le_bytes(*rest.first_chunk::<8>()?)))
 }
@@ -115,7 +115,7 @@ impl<'a> Chunk<'a> {
     pub fn iter(&self) -> impl Iterator<Item = (u8, &'a [u8])> + use<'a> {
         let mut rest = self.records;
         std::iter::from_fn(move || {
-            let (kind, length) = head(rest)?;
+            let (kind, length) = header(rest)?;
             let length = usize::try_from(length).ok()?;
             let (body, after) = rest.get(HEAD..)?.split_at_checked(length)?;
             rest = after;
@@ -258,15 +258,15 @@ impl<R: Read> Records<R> {
         if !self.begun {
             self.begun = true;
             let mut magic = [0; MAGIC.len()];
-            self.reader.read_exact(&mut magic).map_err(cut)?;
+            self.reader.read_exact(&mut magic).map_err(read_failure)?;
             if magic != *MAGIC {
                 return Err(Trouble::NoMagic);
             }
         }
         loop {
             let mut bytes = [0; HEAD];
-            self.reader.read_exact(&mut bytes).map_err(cut)?;
-            let (kind, length) = head(&bytes).ok_or(Trouble::Cut)?;
+            self.reader.read_exact(&mut bytes).map_err(read_failure)?;
+            let (kind, length) = header(&bytes).ok_or(Trouble::Cut)?;
             let mut body = (&mut self.reader).take(length);
             match kind {
                 kind::DATA_END | kind::FOOTER => return Ok(None),
@@ -292,7 +292,7 @@ impl<R: Read> Records<R> {
     }
 }
 
-fn cut(reason: io::Error) -> Trouble {
+fn read_failure(reason: io::Error) -> Trouble {
     if reason.kind() == io::ErrorKind::UnexpectedEof { Trouble::Cut } else { Trouble::Io(reason) }
 }
 

@@ -173,10 +173,10 @@ fn keeps_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     if matches!(there, FileKind::Json | FileKind::Report) || fresh == Some(there) {
         return Ok(());
     }
-    let fresh = fresh.map_or("a result of another kind", FileKind::words);
+    let fresh = fresh.map_or("a result of another kind", FileKind::description);
     Err(Error::new(
         DataCode::CallInvalid,
-        format!("{} stands here, and {fresh} would take its place", there.words()),
+        format!("{} stands here, and {fresh} would take its place", there.description()),
     )
     .file(path)
     .help("name another output file; `host COMMAND --help` lists the options that write files"))

@@ -37,11 +37,11 @@ mod source;
 mod spikes;
 mod stroke_zero;
 mod tdms;
+mod text_column;
 mod thousands;
 mod time_of_day;
 mod unit_check;
 mod usual_line;
-mod words;
 #[cfg(feature = "excel")]
 mod workbook;
 

@@ -237,7 +237,7 @@ impl Emulated {
 
     /// As text, for people.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         match (self.kind, &self.why_native) {
             (Kind::Qemu, _) => "the firmware's image on an emulated Cortex-M4 (QEMU, mps2-an386)".to_owned(),
             (Kind::Native, Some(why)) => format!("the firmware's library in this process, as {why}"),

@@ -167,7 +167,7 @@ fn weighted_rows(root_weight: &[f64], value: impl Fn(usize) -> f64 + Sync) -> Ve
 }
 
 /// What the baseline and the effects beside it express, and the basis of all its columns.
-fn reach(
+fn column_space(
     rows: &Rows,
     kind: Kind,
     effects: &[Vec<f64>],
@@ -214,7 +214,7 @@ fn round(rows: &Rows, kind: Kind, effects: &[Vec<f64>], plan: &Plan, live: &[f64
     let (contexts, w) = (rows.contexts(), rows.root_weight());
     let Iterate { friction, quasi } = at;
     let factor: Vec<f64> = (0..n).map(|i| live[i] * (1.0 - friction[i] * contexts[i].direction)).collect();
-    let (span, joint) = reach(rows, kind, effects, plan, |p| column(rows, plan, live, at, &factor, p));
+    let (span, joint) = column_space(rows, kind, effects, plan, |p| column(rows, plan, live, at, &factor, p));
     // With friction's coefficients counted from zero, not from the last round, so that a prior holds for the whole.
     let y: Vec<f64> = (0..n)
         .map(|i| {

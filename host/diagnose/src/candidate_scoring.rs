@@ -169,7 +169,7 @@ impl<'a> Scorer<'a> {
         if whole && fit.gain > 0.0 {
             self.score_blocks(&mut fit, &z, &w.given, rows);
         }
-        fit.singles = z.iter().map(|v| self.single(v, rows)).collect();
+        fit.singles = z.iter().map(|v| self.score_alone(v, rows)).collect();
         fit
     }
 
@@ -242,7 +242,7 @@ impl<'a> Scorer<'a> {
     }
 
     /// Block by block, a column against the residual in the scorer's metric, per unit norm.
-    fn single(&self, v: &[f64], rows: &Rows) -> Vec<f64> {
+    fn score_alone(&self, v: &[f64], rows: &Rows) -> Vec<f64> {
         let mut scores = vec![0.0; rows.blocks];
         let norm = energy(v).sqrt();
         if norm > 0.0 {

@@ -14,7 +14,7 @@ use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN, NORMAL
 use super::linear::{add_scaled, dot, energy};
 use super::rows::Rows;
 use super::selection_step::{SelectedEffect, Selection};
-use super::why::Moment;
+use super::why::ChangePoint;
 
 /// The index of a change point among an effect's shapes, if it has one.
 pub(crate) fn place(candidate: &Candidate, fit: &CandidateFit) -> Option<usize> {
@@ -23,20 +23,20 @@ pub(crate) fn place(candidate: &Candidate, fit: &CandidateFit) -> Option<usize> 
 }
 
 /// Where in the campaign a change point lies.
-pub(crate) fn of(moment: f64, rows: &Rows) -> Moment {
+pub(crate) fn of(moment: f64, rows: &Rows) -> ChangePoint {
     let name = |row: usize| rows.names[rows.recording[row] as usize].clone();
     let after = rows.contexts().partition_point(|c| c.time < moment);
     if after == 0 {
-        return Moment::Before(name(0));
+        return ChangePoint::Before(name(0));
     }
     if after == rows.len() {
-        return Moment::After(name(after - 1));
+        return ChangePoint::After(name(after - 1));
     }
     if rows.recording[after] != rows.recording[after - 1] {
-        return Moment::Between(name(after - 1), name(after));
+        return ChangePoint::Between(name(after - 1), name(after));
     }
     let local = rows.local_time[after] - (rows.contexts()[after].time - moment);
-    Moment::In(name(after), local)
+    ChangePoint::In(name(after), local)
 }
 
 /// The standard deviation of a change point, s; none where the recordings do not determine it.

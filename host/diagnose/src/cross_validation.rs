@@ -43,7 +43,7 @@ fn stride(rows: &Rows) -> usize {
 }
 
 /// Every n-th row, with columns over them.
-pub(super) fn thin(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
+pub(super) fn downsample(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
     let stride = stride(rows);
     let pick = |v: &Vec<f64>| v.iter().step_by(stride).copied().collect::<Vec<f64>>();
     (rows.thinned(stride), traces.iter().map(pick).collect())
@@ -227,7 +227,7 @@ impl HeldOutRows {
             Kind::Soft(prior) if prior.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),
             Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
         };
-        let (thin, traces) = thin(rows, traces);
+        let (thin, traces) = downsample(rows, traces);
         let shows = |t: &Vec<f64>| t.iter().zip(&thin.vented).any(|(force, vented)| *vented && *force != 0.0);
         let tares = traces.iter().any(shows);
         let mut split = strictest(&thin, kind);

@@ -53,9 +53,9 @@ pub(crate) fn missing(selection: &Selection, library: &[Candidate], rows: &Rows)
             } else {
                 Chance::FewStrokes { p: t.p, log_ratio: t.fit.score / 2.0 }
             };
-            let moment = change_point::place(candidate, &t.fit)
+            let change_point = change_point::place(candidate, &t.fit)
                 .map(|shape| change_point::of(t.fit.shapes[shape], rows));
-            let why = Why::Found(Evidence { share, chance, moment });
+            let why = Why::Found(Evidence { share, chance, change_point });
             Missing {
                 model_weight,
                 share_explained: share,

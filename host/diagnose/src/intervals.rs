@@ -19,7 +19,7 @@ use super::candidates::Candidate;
 use super::change_point;
 use super::criteria::rows::MOST_LEVELS;
 use super::criteria::uncertainty::{FEWEST_GROUPS, FOLDS, IDENTIFIABLE, LAW_DEVIATION, TANGENT_STEP};
-use super::cross_validation::thin;
+use super::cross_validation::downsample;
 use super::linear::{Basis, dot, energy, solve_symmetric};
 use super::rows::Rows;
 use super::selection_step::Selection;
@@ -149,7 +149,7 @@ fn by_strokes(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<O
 fn by_groups(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     columns.extend(selection.traces.iter().cloned());
-    let (thin, mut columns) = thin(rows, &columns);
+    let (thin, mut columns) = downsample(rows, &columns);
     // The remaining distance to the tangents is the error of the estimate.
     let mut force = thin.force.clone();
     for trace in columns.split_off(tangents.len()) {

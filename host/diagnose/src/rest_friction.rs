@@ -18,7 +18,7 @@ use super::criteria::rest_friction::{
 use super::remark;
 use super::rows::{RestFriction, Rows};
 
-mod held;
+mod held_length;
 mod ramps;
 mod steps;
 
@@ -165,7 +165,7 @@ pub(crate) fn settle_ramps(rows: &Rows) -> (Rows, Option<Turning>) {
 /// Finds the law of friction at rest: the rows with its directions, and the law; none where friction stays as the model holds it.
 pub(crate) fn settle_rest_friction(rows: &Rows) -> (Rows, Option<RestLaw>) {
     if rows.isometric {
-        return held::settle(rows);
+        return held_length::settle(rows);
     }
     let holds = holds(rows);
     let Some(moving) = moving(rows, &holds) else { return (rows.clone(), None) };

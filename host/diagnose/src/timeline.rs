@@ -19,7 +19,7 @@
 pub mod course;
 mod effects;
 mod fitted;
-mod held;
+mod held_length;
 mod mean;
 pub mod series;
 mod stroked;
@@ -93,7 +93,7 @@ pub fn timeline(visits: &[Visit], options: &Options<'_>) -> Result<Timeline> {
     refuse_others(visits, &comparisons)?;
     let mut all = effects::series(&comparisons);
     let measured = if held {
-        held::series(visits, options.reference)?
+        held_length::series(visits, options.reference)?
     } else {
         stroked::series(visits, options.reference)?
     };

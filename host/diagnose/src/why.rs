@@ -21,7 +21,7 @@ pub enum Chance {
 
 /// When something happened.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Moment {
+pub enum ChangePoint {
     /// Before this recording began.
     Before(String),
     /// After the end of this recording.
@@ -39,8 +39,8 @@ pub struct Evidence {
     pub share: f64,
     /// By chance.
     pub chance: Chance,
-    /// When it happened, of an effect that has a moment.
-    pub moment: Option<Moment>,
+    /// When it happened, of an effect that begins.
+    pub change_point: Option<ChangePoint>,
 }
 
 /// Error on held-out rows, N.

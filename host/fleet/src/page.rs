@@ -1,7 +1,7 @@
 //! The page of a fleet: distributions, outlying muscles, effects by share, groups that differ, failures.
 
 use pam_data::pluralise::pluralise;
-use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
+use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 
 use crate::fleet::{Fleet, Member, Quantity};
 use crate::groups::{self, Difference, Finding};
@@ -22,7 +22,7 @@ const MOST_POINTS: usize = 5000;
 #[must_use]
 pub fn page(fleet: &Fleet, overview: &Overview, results: &str) -> Page {
     let mut page = Page::new("Fleet", pluralise(fleet.members.len(), "muscle"));
-    head(&mut page, fleet, overview);
+    header(&mut page, fleet, overview);
     page.push(differences(fleet, overview));
     page.push(outlying(fleet, overview, results));
     page.push(effects(fleet, overview, results));
@@ -35,7 +35,7 @@ pub fn page(fleet: &Fleet, overview: &Overview, results: &str) -> Page {
     page
 }
 
-fn head(page: &mut Page, fleet: &Fleet, overview: &Overview) {
+fn header(page: &mut Page, fleet: &Fleet, overview: &Overview) {
     let (failed, outlying) = (fleet.failed(), overview.outlying_muscles());
     let tone = if failed + outlying + overview.differences.len() > 0 { Tone::Caution } else { Tone::Good };
     let mut parts = vec![format!("{} fitted", fixed(fleet.fitted() as f64, 0))];
@@ -53,8 +53,12 @@ fn head(page: &mut Page, fleet: &Fleet, overview: &Overview) {
     page.fact("outlying", count(outlying), format!("|z| > {}", fixed(overview.limit, 1)), bad(outlying));
     page.fact("failed", count(failed), "see Failures", bad(failed));
     for d in overview.distributions.iter().filter(|d| fleet.quantities[d.quantity].name == "deadband_kPa") {
-        let note = format!("5 to 95 %: {} to {} kPa", figures(d.quantiles[0], 3), figures(d.quantiles[4], 3));
-        page.fact("median P_{0}", format!("{} kPa", figures(d.quantiles[2], 3)), note, Tone::Plain);
+        let note = format!(
+            "5 to 95 %: {} to {} kPa",
+            significant(d.quantiles[0], 3),
+            significant(d.quantiles[4], 3)
+        );
+        page.fact("median P_{0}", format!("{} kPa", significant(d.quantiles[2], 3)), note, Tone::Plain);
     }
 }
 
@@ -72,7 +76,7 @@ fn name_of(q: &Quantity, fleet: &Fleet) -> String {
 }
 
 fn with_unit(value: f64, q: &Quantity) -> String {
-    format!("{} {}", figures(value, 3), q.unit).trim_end().to_owned()
+    format!("{} {}", significant(value, 3), q.unit).trim_end().to_owned()
 }
 
 fn tags(member: &Member) -> String {
@@ -152,11 +156,11 @@ fn distributions(fleet: &Fleet, overview: &Overview) -> Section {
             reading,
             histogram(fleet, overview, d),
         ));
-        let scale = d.centre.map_or_else(String::new, |c| figures(c.deviation, 2));
+        let scale = d.centre.map_or_else(String::new, |c| significant(c.deviation, 2));
         let mut cells =
             vec![format!("{} ({})", name_of(q, fleet), if q.unit.is_empty() { "–" } else { q.unit })];
         cells.push(fixed(d.muscles as f64, 0));
-        cells.extend(d.quantiles.map(|v| figures(v, 3)));
+        cells.extend(d.quantiles.map(|v| significant(v, 3)));
         cells.push(scale);
         table.row(cells);
     }
@@ -308,7 +312,7 @@ fn differences(fleet: &Fleet, overview: &Overview) -> Section {
             tag,
             text,
             finding.muscles.to_string(),
-            if finding.p < 1e-6 { "< 10^{−6}".into() } else { figures(finding.p, 1) },
+            if finding.p < 1e-6 { "< 10^{−6}".into() } else { significant(finding.p, 1) },
         ]);
     }
     section.table(table);
@@ -380,7 +384,7 @@ fn members(fleet: &Fleet, overview: &Overview, results: &str) -> Section {
     let mut table = Table { caption: "Muscles by name".into(), header, ..Table::default() };
     for member in fleet.members.iter().take(MOST_ROWS) {
         let mut cells = vec![member.muscle.clone()];
-        cells.extend(member.values.iter().map(|v| v.map_or_else(String::new, |v| figures(v, 3))));
+        cells.extend(member.values.iter().map(|v| v.map_or_else(String::new, |v| significant(v, 3))));
         cells.push(member.verdict.clone().unwrap_or_default());
         cells.push(member.effects.iter().map(|e| e.effect.as_str()).collect::<Vec<_>>().join(", "));
         cells.push(tags(member));

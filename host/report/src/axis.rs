@@ -230,12 +230,12 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 ///
 /// ```
 /// use pam_report::figures;
-/// assert_eq!(figures(0.041_87, 2), "0.042");
-/// assert_eq!(figures(135.71, 3), "136");
-/// assert_eq!(figures(1.234e-9, 3), "1.23·10^{−9}");
+/// assert_eq!(significant(0.041_87, 2), "0.042");
+/// assert_eq!(significant(135.71, 3), "136");
+/// assert_eq!(significant(1.234e-9, 3), "1.23·10^{−9}");
 /// ```
 #[must_use]
-pub fn figures(value: f64, digits: usize) -> String {
+pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
     }

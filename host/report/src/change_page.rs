@@ -1,11 +1,11 @@
 //! The report of a diagnosis against a reference: what has changed, in pictures.
 
-use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
+use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 use pam_data::recording::Campaign;
 use pam_diagnose::reference::answer::Curve;
 use pam_diagnose::reference::{ChangeReport, Verdict};
 
-use super::wording::{change as words, separate};
+use super::wording::{change as wording, separate};
 
 /// Panels in one picture, at most.
 const MOST_PANELS: usize = 6;
@@ -24,10 +24,10 @@ pub fn page(r: &ChangeReport, after: &Campaign) -> Page {
             "{} rows after, {} before, largest force {} N",
             fixed(r.samples as f64, 0),
             fixed(r.reference.samples as f64, 0),
-            figures(r.largest_force_N, 3)
+            significant(r.largest_force_N, 3)
         ),
     );
-    head(&mut page, r);
+    header(&mut page, r);
     page.push(changes(r));
     page.push(probabilities(r));
     page.push(forces(r));
@@ -46,23 +46,23 @@ pub fn page(r: &ChangeReport, after: &Campaign) -> Page {
     page
 }
 
-fn head(page: &mut Page, r: &ChangeReport) {
+fn header(page: &mut Page, r: &ChangeReport) {
     let tone = match r.verdict {
         Verdict::Consistent => Tone::Good,
         Verdict::Explained | Verdict::PartlyExplained => Tone::Caution,
         Verdict::Unexplained => Tone::Bad,
     };
-    page.verdict(tone, words::headline(r));
+    page.verdict(tone, wording::headline(r));
     let share = 100.0 * r.misfit_rms_N / r.largest_force_N.max(f64::MIN_POSITIVE);
     page.fact(
         "difference",
-        format!("{} N", figures(r.misfit_rms_N, 2)),
-        format!("{} % of the largest force, rms", figures(share, 2)),
+        format!("{} N", significant(r.misfit_rms_N, 2)),
+        format!("{} % of the largest force, rms", significant(share, 2)),
         tone,
     );
     page.fact(
         "untouched recordings differ by",
-        format!("{} N", figures(r.noise_N, 2)),
+        format!("{} N", significant(r.noise_N, 2)),
         "one cell, standard deviation",
         Tone::Plain,
     );
@@ -70,7 +70,7 @@ fn head(page: &mut Page, r: &ChangeReport) {
         let h = &r.held_out;
         page.fact(
             "on recordings held out",
-            format!("{} → {} N", figures(h.rms_before_N, 2), figures(h.rms_after_N, 2)),
+            format!("{} → {} N", significant(h.rms_before_N, 2), significant(h.rms_after_N, 2)),
             "difference without and with the named changes",
             if h.rms_after_N < h.rms_before_N { Tone::Good } else { Tone::Bad },
         );
@@ -83,13 +83,13 @@ fn changes(r: &ChangeReport) -> Section {
         section.text(format!(
             "*{}* ({}): {}. Probability {}, of its class {}. Law: {}. Since when: {}. It is {}.",
             m.effect,
-            words::sizes(&m.parameters),
-            words::remedy(m.change),
+            wording::sizes(&m.parameters),
+            wording::remedy(m.change),
             fixed(m.probability, 2),
             fixed(m.class_probability, 2),
             m.change.about().changed.law,
-            words::since(&m.since),
-            words::owner(m.owner)
+            wording::since(&m.since),
+            wording::owner(m.owner)
         ));
         if !m.confusable_with.is_empty() {
             section.text(format!("These recordings cannot tell it from {}.", m.confusable_with.join(", ")));
@@ -100,12 +100,12 @@ fn changes(r: &ChangeReport) -> Section {
         }
     }
     if r.missing.is_empty() {
-        section.text(words::headline(r));
+        section.text(wording::headline(r));
     }
     if let Some((names, apart)) = separate::unnamed(r) {
         section.text(format!("It is one of {}. To separate them: {}.", names.join(", "), apart.join("; ")));
     }
-    section.list(r.remarks.iter().map(words::remark));
+    section.list(r.remarks.iter().map(wording::remark));
     section
 }
 
@@ -212,7 +212,7 @@ fn located(r: &ChangeReport) -> Section {
     if r.r#where.is_empty() {
         section.text("No part of the data holds more of the difference than its share.");
     }
-    section.list(r.r#where.iter().map(words::place));
+    section.list(r.r#where.iter().map(wording::place));
     section
 }
 
@@ -226,8 +226,8 @@ fn unseen_sizes(r: &ChangeReport) -> Section {
         table.row([
             c.effect.clone(),
             fixed(c.gain, 2),
-            c.detectable.map_or_else(|| "–".into(), |d| words::in_usual_unit(d, &c.unit)),
-            words::why_not(c.why_not).into(),
+            c.detectable.map_or_else(|| "–".into(), |d| wording::in_usual_unit(d, &c.unit)),
+            wording::why_not(c.why_not).into(),
         ]);
     }
     section.table(table);
@@ -239,6 +239,6 @@ fn limits(r: &ChangeReport) -> Section {
     if r.reference.not_comparable.is_empty() {
         section.text("Everything that was recorded after was compared.");
     }
-    section.list(r.reference.not_comparable.iter().map(words::not_comparable));
+    section.list(r.reference.not_comparable.iter().map(wording::not_comparable));
     section
 }

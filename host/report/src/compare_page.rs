@@ -1,6 +1,6 @@
 //! The page of two recordings side by side: each quantity of both over time, its difference, and both as loops.
 
-use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
+use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 use pam_data::compare::{Column, Comparison};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Recording;
@@ -18,8 +18,8 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
             continue;
         }
         let note =
-            format!("rms difference; mean {}, largest {}", signed(c.mean, c.rms), figures(c.largest, 3));
-        page.fact(label, format!("{} {}", figures(c.rms, 3), c.unit), note, Tone::Plain);
+            format!("rms difference; mean {}, largest {}", signed(c.mean, c.rms), significant(c.largest, 3));
+        page.fact(label, format!("{} {}", significant(c.rms, 3), c.unit), note, Tone::Plain);
     }
     page.push(numbers(found));
     let mut over_time = Section::new("Over time");
@@ -57,7 +57,7 @@ fn signed(value: f64, rms: f64) -> String {
         return "0".to_owned();
     }
     let sign = if value > 0.0 { "+" } else { "" };
-    format!("{sign}{}", figures(value, 3))
+    format!("{sign}{}", significant(value, 3))
 }
 
 fn verdict(a: &Recording, b: &Recording, found: &Comparison) -> String {
@@ -74,13 +74,13 @@ fn verdict(a: &Recording, b: &Recording, found: &Comparison) -> String {
     let largest =
         [a, b].into_iter().flat_map(|r| r.force.iter().flatten()).fold(0.0f64, |m, f| m.max(f.abs()));
     let share = if largest > 0.0 {
-        format!(" ({} % of the largest force in either)", figures(100.0 * force.mean.abs() / largest, 2))
+        format!(" ({} % of the largest force in either)", significant(100.0 * force.mean.abs() / largest, 2))
     } else {
         String::new()
     };
     format!(
         "The mean force of B is {} N {} than that of A{share}, over the common {seconds} s.",
-        figures(force.mean.abs(), 3),
+        significant(force.mean.abs(), 3),
         if force.mean < 0.0 { "lower" } else { "higher" }
     )
 }
@@ -96,9 +96,9 @@ fn numbers(found: &Comparison) -> Section {
     for c in &found.columns {
         table.row([
             format!("{}, {}", title(c.name), c.unit),
-            figures(c.rms, 3),
+            significant(c.rms, 3),
             signed(c.mean, c.rms),
-            figures(c.largest, 3),
+            significant(c.largest, 3),
             fixed(c.largest_at, 2),
         ]);
     }
@@ -138,7 +138,7 @@ fn over_time_of(
     );
     let reading = format!(
         "Difference over time. The largest, {} {}, is at {} s.",
-        figures(column.largest, 3),
+        significant(column.largest, 3),
         column.unit,
         fixed(column.largest_at, 2)
     );

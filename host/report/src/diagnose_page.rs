@@ -11,7 +11,7 @@ use super::effect_page::place;
 use super::effect_trace::Demonstration;
 use super::symbols::symbols;
 use super::wording;
-use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed};
+use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
@@ -36,7 +36,11 @@ pub fn page_with_residuals(
     let mut page = Page::new(
         format!("Diagnosis of {}", d.muscle),
         if d.judged() {
-            format!("{} rows, blocked force {} N", fixed(d.samples as f64, 0), figures(d.blocked_force_N, 3))
+            format!(
+                "{} rows, blocked force {} N",
+                fixed(d.samples as f64, 0),
+                significant(d.blocked_force_N, 3)
+            )
         } else {
             format!("{} rows", fixed(d.samples as f64, 0))
         },
@@ -74,7 +78,7 @@ fn in_doubt(d: &Diagnosis) -> String {
 }
 
 fn percent(part: f64, whole: f64) -> String {
-    if whole > 0.0 { figures(100.0 * part / whole, 2) } else { "–".into() }
+    if whole > 0.0 { significant(100.0 * part / whole, 2) } else { "–".into() }
 }
 
 fn header(page: &mut Page, d: &Diagnosis) {
@@ -89,11 +93,11 @@ fn header(page: &mut Page, d: &Diagnosis) {
     }
     page.fact(
         "error of the plain model",
-        format!("{} N", figures(d.misfit_rms_N, 2)),
+        format!("{} N", significant(d.misfit_rms_N, 2)),
         format!(
             "rms, {} % of blocked force; the noise is {} N",
             percent(d.misfit_rms_N, d.blocked_force_N),
-            figures(d.noise_N, 2)
+            significant(d.noise_N, 2)
         ),
         if d.verdict() == Verdict::Consistent && !wording::one_bladder_misfits(d) {
             Tone::Good
@@ -110,7 +114,7 @@ fn header(page: &mut Page, d: &Diagnosis) {
         };
         page.fact(
             "error on held-out rows",
-            format!("{} → {} N", figures(h.rms_before_N, 2), figures(h.rms_after_N, 2)),
+            format!("{} → {} N", significant(h.rms_before_N, 2), significant(h.rms_after_N, 2)),
             "rms, without and with the effects",
             tone,
         );
@@ -201,7 +205,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
     let place = place(m.place);
     section.text(format!(
         "It acts on {place}. {whose} Its largest force in these recordings is {} N, {} % of the blocked force.",
-        figures(m.peak_N, 2),
+        significant(m.peak_N, 2),
         percent(m.peak_N, d.blocked_force_N)
     ));
     if let Some(candidate) = candidate {
@@ -213,7 +217,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         &["symbol", "parameter", "value", "± (95 %)", "unit", "remark"],
     );
     for p in &m.parameters {
-        let std = p.std.map_or("not identifiable".into(), |s| figures(wording::HALF_95 * s, 2));
+        let std = p.std.map_or("not identifiable".into(), |s| significant(wording::HALF_95 * s, 2));
         let unit = if p.unit.is_empty() { "–".to_owned() } else { p.unit.clone() };
         // Of alternative laws those that were not chosen are zero.
         let (std, remark) = match p {
@@ -225,7 +229,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         let letter = candidate
             .and_then(|c| c.info().parameters.iter().find(|i| i.name == p.name))
             .map_or("–", |i| i.letter);
-        table.row([letter.to_owned(), p.name.clone(), figures(p.value, 3), std, unit, remark.into()]);
+        table.row([letter.to_owned(), p.name.clone(), significant(p.value, 3), std, unit, remark.into()]);
     }
     section.table(table);
     if let Some(traded) = wording::traded_off(m) {
@@ -304,7 +308,7 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
                 "`{}`: a table of these recordings carries it where they are then predicted better (`-o`). It makes up to {} N ({} % of blocked \
                  force) in them. It was found at held length; under motion it is a prediction.",
                 m.effect,
-                figures(m.peak_N, 2),
+                significant(m.peak_N, 2),
                 percent(m.peak_N, d.blocked_force_N)
             ));
             continue;
@@ -319,13 +323,13 @@ fn controller(d: &Diagnosis, geometry: &Geometry) -> Section {
         let mut text = format!(
             "`{}`: the feed-forward force changes by up to {} N ({} % of blocked force)",
             m.effect,
-            figures(m.peak_N, 2),
+            significant(m.peak_N, 2),
             percent(m.peak_N, d.blocked_force_N)
         );
         if let Some(area) = area {
             text += &format!(
                 ", so at rest length the commanded pressure changes by up to {} kPa",
-                figures(m.peak_N / area / 1e3, 2)
+                significant(m.peak_N / area / 1e3, 2)
             );
         }
         text.push('.');

@@ -7,7 +7,7 @@ use model_core::table::TableError;
 
 use super::effect_trace::{Demonstration, Trace, likeness};
 use super::symbols::symbols;
-use super::{Page, Section, Table, figures};
+use super::{Page, Section, Table, significant};
 use pam_fit::bench::Candidate;
 
 /// Description of where an effect acts in the chain from the air to the reading.
@@ -88,7 +88,7 @@ fn parameters(trace: &Trace) -> Table {
             Role::Shape => "shapes the force",
         };
         let unit = if p.unit.is_empty() { "–" } else { p.unit };
-        let numbers = [p.low, p.high, *value].map(|v| figures(v, 2));
+        let numbers = [p.low, p.high, *value].map(|v| significant(v, 2));
         table.row([p.letter, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
     }
     table

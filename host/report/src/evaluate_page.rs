@@ -4,7 +4,7 @@ use pam_evaluate::cross_validation::{CrossValidation, Score, Spot};
 use pam_evaluate::length_transfer::LengthTransfer;
 use pam_evaluate::stock_transfer::StockTransfer;
 
-use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, figures, fixed, residual_table};
+use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, residual_table, significant};
 
 /// Mean error below which a table is called good, percent of the largest measured force, as in the report of a fit at held-out pressures.
 const GOOD: f64 = 2.0;
@@ -100,10 +100,10 @@ fn header(page: &mut Page, all: &[Evaluated<'_>], means: &Means) {
     let (worst, what) = means.worst();
     let mut verdict = format!(
         "On held-out {what}, the mean error is {} % of the largest measured force.",
-        figures(worst, 2)
+        significant(worst, 2)
     );
     if let Some(published) = means.published {
-        verdict += &format!(" The published formula has {} %.", figures(published, 2));
+        verdict += &format!(" The published formula has {} %.", significant(published, 2));
     }
     page.verdict(tone(worst), verdict);
     let shown = [
@@ -115,7 +115,7 @@ fn header(page: &mut Page, all: &[Evaluated<'_>], means: &Means) {
         if let Some(value) = value {
             page.fact(
                 label,
-                format!("{} %", figures(value, 2)),
+                format!("{} %", significant(value, 2)),
                 "mean error, of the largest force",
                 tone(value),
             );
@@ -126,7 +126,7 @@ fn header(page: &mut Page, all: &[Evaluated<'_>], means: &Means) {
     {
         page.fact(
             "largest measured force",
-            format!("{} N", figures(any.largest, 4)),
+            format!("{} N", significant(any.largest, 4)),
             "the errors refer to it",
             Tone::Plain,
         );

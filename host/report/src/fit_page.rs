@@ -2,14 +2,14 @@
 
 mod controller;
 mod curves;
-mod held;
+mod held_length;
 mod loads;
 mod models;
 mod parameters;
 mod residuals;
 mod view;
 
-use super::{Page, Section, Table, Tone, figures, fixed};
+use super::{Page, Section, Table, Tone, fixed, significant};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
 use pam_fit::Fit;
@@ -68,14 +68,16 @@ fn header(page: &mut Page, view: &View<'_>) {
     let unseen = s.left_out_pressure_mean_error_pct;
     let mut verdict = format!(
         "The table reproduces the measured force to {} % of the blocked force on average, {} % at most",
-        figures(s.mean_error_pct, 2),
-        figures(s.max_error_pct, 2)
+        significant(s.mean_error_pct, 2),
+        significant(s.max_error_pct, 2)
     );
     let mut worst = tone(s.mean_error_pct, GOOD, BAD);
     match unseen {
         Some(unseen) => {
-            verdict +=
-                &format!(". At pressures left out of the fit the mean error is {} %.", figures(unseen, 2));
+            verdict += &format!(
+                ". At pressures left out of the fit the mean error is {} %.",
+                significant(unseen, 2)
+            );
             if tone(unseen, 2.0 * GOOD, BAD) == Tone::Bad || worst == Tone::Good && unseen > 2.0 * GOOD {
                 worst = tone(unseen, 2.0 * GOOD, BAD);
             }
@@ -95,14 +97,14 @@ fn header(page: &mut Page, view: &View<'_>) {
     page.verdict(worst, verdict);
     page.fact(
         "mean error",
-        format!("{} %", figures(s.mean_error_pct, 2)),
+        format!("{} %", significant(s.mean_error_pct, 2)),
         "of blocked force",
         tone(s.mean_error_pct, GOOD, BAD),
     );
     if let Some(unseen) = unseen {
         page.fact(
             "error at held-out pressures",
-            format!("{} %", figures(unseen, 2)),
+            format!("{} %", significant(unseen, 2)),
             "of blocked force, each pressure in turn",
             tone(unseen, 2.0 * GOOD, BAD),
         );
@@ -110,14 +112,14 @@ fn header(page: &mut Page, view: &View<'_>) {
     if unseen.is_none() {
         page.fact(
             "largest error",
-            format!("{} %", figures(s.max_error_pct, 2)),
+            format!("{} %", significant(s.max_error_pct, 2)),
             view.worst_place(),
             tone(s.max_error_pct, 3.0 * GOOD, 3.0 * BAD),
         );
     }
     page.fact(
         "blocked force",
-        format!("{} N", figures(s.blocked_force_N, 4)),
+        format!("{} N", significant(s.blocked_force_N, 4)),
         format!("at {} kPa", fixed(view.highest_pressure() / 1e3, 0)),
         Tone::Plain,
     );
@@ -127,13 +129,13 @@ fn header(page: &mut Page, view: &View<'_>) {
 fn further_figures(view: &View<'_>) -> Table {
     let s = &view.fit.summary;
     let mut table = Table::new("Figures of the fit", &["quantity", "value", "remark"]);
-    table.row(["largest error", &format!("{} %", figures(s.max_error_pct, 2)), &view.worst_place()]);
+    table.row(["largest error", &format!("{} %", significant(s.max_error_pct, 2)), &view.worst_place()]);
     table.row([
         "deadband P_{0}",
         &format!("{} kPa", fixed(s.deadband_kPa, 1)),
-        &format!("± {} kPa (95 % confidence interval)", figures(1.96 * s.deadband_std_kPa, 2)),
+        &format!("± {} kPa (95 % confidence interval)", significant(1.96 * s.deadband_std_kPa, 2)),
     ]);
-    table.row(["residual", &format!("{} N", figures(s.rms_N, 2)), "rms of all fitted points"]);
+    table.row(["residual", &format!("{} N", significant(s.rms_N, 2)), "rms of all fitted points"]);
     table
 }
 
@@ -178,10 +180,10 @@ fn remarks(view: &View<'_>) -> Section {
             Tone::Plain,
             format!(
                 "Stress was constrained to rise with strain (`--physical`). Error: {} % mean, {} % at most; without the constraint {} % and {} %.",
-                figures(s.mean_error_pct, 2),
-                figures(s.max_error_pct, 2),
-                figures(free.free_mean_error_pct, 2),
-                figures(free.free_max_error_pct, 2)
+                significant(s.mean_error_pct, 2),
+                significant(s.max_error_pct, 2),
+                significant(free.free_mean_error_pct, 2),
+                significant(free.free_max_error_pct, 2)
             ),
         );
     }

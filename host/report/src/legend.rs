@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::axis::figures;
+use super::axis::significant;
 use super::canvas::{FONT_SIZE, px, text};
 use super::colour::Colour;
 use super::figure::{Figure, Layer, Mark, Style};
@@ -53,8 +53,8 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
         }
         named.push(label);
         let (largest, both) = marks::heat_range(values);
-        let low = if both { figures(-largest, 2) } else { "0".into() };
-        let high = figures(largest, 2);
+        let low = if both { significant(-largest, 2) } else { "0".into() };
+        let high = significant(largest, 2);
         let bar = 90.0;
         let words = [label.as_str(), &low, &high].map(|t| inline_markup::width(t) * FONT_SIZE);
         let (a, b) = room(words[0] + 10.0 + words[1] + 6.0 + bar + 6.0 + words[2]);

@@ -50,7 +50,7 @@ mod residual_table;
 mod svg;
 pub mod symbols;
 
-pub use axis::{Axis, Scale, figures, fixed};
+pub use axis::{Axis, Scale, fixed, significant};
 pub use colour::Colour;
 pub use figure::{Figure, Layer, Mark, Panel, Style};
 pub use page::{Block, Fact, Page, Section, Table, Tone};

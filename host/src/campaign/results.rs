@@ -74,7 +74,7 @@ fn step(done: &Done) -> document::Step {
     document::Step {
         number: c.number,
         name: c.step.name(),
-        what: c.step.words(),
+        what: c.step.description(),
         why: c.why.clone(),
         finding: done.finding.clone(),
         file: done.file.clone(),

@@ -79,7 +79,7 @@ pub(crate) fn emulated(
         let made = checks::all(&bench, force, pressure, clock);
         Ok(made.into_iter().find(|c| c.name == check.file()).map(|c| c.csv))
     });
-    let words = emulated.words();
+    let words = emulated.description();
     let controller = Controller::new(client, Box::new(axis.clone()), made);
     Ok(Rigging { controller, rig, muscle, words, emulated: Some((emulated, axis)) })
 }

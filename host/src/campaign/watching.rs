@@ -43,7 +43,7 @@ impl Observer for Watching<'_> {
         self.console.note(format!(
             "{:2}. {} ({:.0} s). {}",
             chosen.number,
-            chosen.step.words(),
+            chosen.step.description(),
             chosen.expected_s,
             chosen.why
         ));

@@ -113,7 +113,7 @@ pub fn tell(watch: Option<&ChangeWatch>, last: &mut String, console: &Console) {
         Update::Answer(report) => wording::headline(report),
     };
     if names != *last {
-        console.note(update.words());
+        console.note(update.description());
         *last = names;
     }
 }
@@ -122,7 +122,7 @@ pub fn tell(watch: Option<&ChangeWatch>, last: &mut String, console: &Console) {
 pub fn finish(watch: Option<ChangeWatch>) -> Option<(String, serde_json::Value)> {
     let update = watch?.finish()?;
     Some(match &update {
-        Update::Waiting(_) => (update.words(), serde_json::Value::Null),
+        Update::Waiting(_) => (update.description(), serde_json::Value::Null),
         Update::Answer(report) => {
             let document = serde_json::from_str(&pam_report::document::change_json(report));
             (wording::summary(report), document.unwrap_or_default())

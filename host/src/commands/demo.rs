@@ -104,7 +104,7 @@ impl Arguments {
             _ => None,
         };
         let emulated = Emulated::start(stand, only, f64::from(SPEED))?;
-        step(3, format!("controller started: {}", emulated.words()));
+        step(3, format!("controller started: {}", emulated.description()));
         let run =
             self.control(&emulated, &table, &made, step, console).map_err(|e| with_log(e, &emulated))?;
         drop(emulated);
@@ -216,7 +216,7 @@ impl Arguments {
                 losses.samples
             ),
         );
-        Ok(ControllerRun { controller: emulated.words(), device, tracks, recordings })
+        Ok(ControllerRun { controller: emulated.description(), device, tracks, recordings })
     }
 
     fn keep(&self, client: &mut Client, track: &Track) -> Result<PathBuf> {

@@ -158,7 +158,7 @@ impl Arguments {
             diagnose_page::page_with_residuals(&answer, &muscle.geometry(), &campaign, residuals)
         })?;
         if self.json.as_deref() != Some(Path::new("-")) {
-            let words = words(&answer, residuals);
+            let words = summary(&answer, residuals);
             if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
@@ -247,7 +247,7 @@ fn measure_errors(
 }
 
 /// The answer as text, with the residuals of the table without effects by recording.
-fn words(answer: &Diagnosis, residuals: &[RecordingResidual]) -> String {
+fn summary(answer: &Diagnosis, residuals: &[RecordingResidual]) -> String {
     let mut words = wording::summary(answer);
     let table = recording_table(residuals);
     if !table.is_empty() {

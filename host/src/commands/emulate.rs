@@ -75,7 +75,7 @@ impl Arguments {
             allow_silence(&mut Client::open(emulated.address())?, self.speed)?;
         }
         if self.json {
-            let (port, words) = (emulated.address().to_string(), emulated.words());
+            let (port, words) = (emulated.address().to_string(), emulated.description());
             let axis = axis.as_deref();
             let document = bench::Emulate { schema: "pam-emulate/1", port: &port, controller: &words, axis };
             console.result(line(&document)?);
@@ -85,7 +85,7 @@ impl Arguments {
                 console.result(axis);
             }
         }
-        console.note(format!("{}; Ctrl-C ends it", emulated.words()));
+        console.note(format!("{}; Ctrl-C ends it", emulated.description()));
         console.note(format!("next: host device info --port {}", emulated.address()));
         let begun = Instant::now();
         let over = || self.seconds.is_some_and(|s| begun.elapsed().as_secs_f64() >= s);

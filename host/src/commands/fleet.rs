@@ -50,9 +50,9 @@ impl Arguments {
         if self.json {
             console.result(text(&to_document(&fleet, &overview))?);
         } else if taken {
-            console.note(words(&fleet, &overview));
+            console.note(summary(&fleet, &overview));
         } else {
-            console.result(words(&fleet, &overview));
+            console.result(summary(&fleet, &overview));
         }
         Ok(())
     }
@@ -73,7 +73,7 @@ fn relative(folder: &Path, page: Option<&Path>) -> String {
     if parts.is_empty() { ".".to_owned() } else { parts.join("/") }
 }
 
-fn words(fleet: &Fleet, overview: &Overview) -> String {
+fn summary(fleet: &Fleet, overview: &Overview) -> String {
     let mut lines = vec![format!(
         "{}: {} fitted, {} diagnosed, {} failed",
         pluralise(fleet.members.len(), "muscle"),

@@ -39,7 +39,7 @@ impl Arguments {
         let side = if self.second { Side::Antagonist } else { Side::Agonist };
         let sums = self.port.connect(console)?.call::<ReadHealth>(&HealthRead { side })?;
         let assessment = assess(&sums);
-        console.result(if self.json { text(&document(&assessment))? } else { words(&assessment) });
+        console.result(if self.json { text(&document(&assessment))? } else { summary(&assessment) });
         Ok(())
     }
 }
@@ -74,7 +74,7 @@ fn document(assessment: &Assessment) -> Health {
     }
 }
 
-fn words(assessment: &Assessment) -> String {
+fn summary(assessment: &Assessment) -> String {
     let Assessment { blocks, independent, residual_n, tolerance_n, .. } = assessment;
     let basis = format!("{blocks} blocks, about {independent:.0} of the recent ones independent");
     match assessment.verdict {

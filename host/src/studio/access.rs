@@ -28,7 +28,7 @@ pub(super) fn same(a: &str, b: &str) -> bool {
 }
 
 /// The one value of a header; `Err` where it is given twice or is no text, `Ok(None)` where it is not given.
-fn single(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, ()> {
+fn single_value(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, ()> {
     let mut all = headers.get_all(name).iter();
     match (all.next(), all.next()) {
         (None, _) => Ok(None),
@@ -42,7 +42,7 @@ fn single(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, ()> {
 fn allowed(access: &Access, request: &Request) -> Result<(), &'static str> {
     let listed = |hosts: &[String], host: &str| hosts.iter().any(|h| h == host);
     let foreign = "this page is served to this machine only, under its own address";
-    match single(request.headers(), header::HOST) {
+    match single_value(request.headers(), header::HOST) {
         Ok(Some(host)) if listed(&access.hosts, host) => {}
         Err(()) => return Err("a request names one host"),
         _ => return Err(foreign),
@@ -50,7 +50,7 @@ fn allowed(access: &Access, request: &Request) -> Result<(), &'static str> {
     if request.uri().authority().is_some_and(|named| !listed(&access.hosts, named.as_str())) {
         return Err(foreign);
     }
-    match single(request.headers(), header::ORIGIN) {
+    match single_value(request.headers(), header::ORIGIN) {
         Ok(None) => Ok(()),
         Ok(Some(origin)) if origin.strip_prefix("http://").is_some_and(|o| listed(&access.origins, o)) => {
             Ok(())
@@ -78,7 +78,7 @@ pub(super) async fn guard(State(access): State<Access>, request: Request, next: 
 
 /// The token of a request's header.
 pub(super) fn has_token(headers: &HeaderMap, token: &str) -> bool {
-    matches!(single(headers, HeaderName::from_static("x-studio-token")), Ok(Some(given)) if same(given, token))
+    matches!(single_value(headers, HeaderName::from_static("x-studio-token")), Ok(Some(given)) if same(given, token))
 }
 
 #[cfg(test)]

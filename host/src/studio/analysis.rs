@@ -61,7 +61,7 @@ impl Analysis {
         Ok(Self { folder, known: Mutex::default() })
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
+    fn state(&self) -> MutexGuard<'_, Known> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -70,7 +70,7 @@ impl Analysis {
     /// # Errors
     /// [`DataCode::CallInvalid`] when nothing was fitted yet.
     pub fn table(&self) -> Result<PathBuf> {
-        self.known().table.clone().ok_or_else(|| {
+        self.state().table.clone().ok_or_else(|| {
             Error::new(DataCode::CallInvalid, "no table exists yet").help("fit recordings first")
         })
     }
@@ -99,7 +99,7 @@ impl Analysis {
         let files = if table {
             vec![self.table()?]
         } else {
-            self.known().recordings.iter().map(|r| r.1.clone()).collect()
+            self.state().recordings.iter().map(|r| r.1.clone()).collect()
         };
         if files.is_empty() {
             return Err(Error::new(DataCode::CallInvalid, "no recordings to compare with")
@@ -111,7 +111,7 @@ impl Analysis {
     /// A report by its name, which only its creator knows.
     #[must_use]
     pub fn report(&self, name: &str) -> Option<Arc<str>> {
-        self.known().reports.iter().find(|r| same(&r.0, name)).map(|r| Arc::clone(&r.1))
+        self.state().reports.iter().find(|r| same(&r.0, name)).map(|r| Arc::clone(&r.1))
     }
 
     /// Keeps a report; gives its address, in which its name is a random one.
@@ -129,7 +129,7 @@ impl Analysis {
         let mut number = 1;
         loop {
             let path = self.folder.join(format!("{stem}-{number}.{extension}"));
-            if !path.exists() && self.known().given.insert(path.clone()) {
+            if !path.exists() && self.state().given.insert(path.clone()) {
                 return path;
             }
             number += 1;
@@ -144,7 +144,7 @@ impl Analysis {
 
     /// Adds a recording that lies in a file.
     pub fn add(&self, path: PathBuf) {
-        self.known().recordings.push((name_of(&path), path));
+        self.state().recordings.push((name_of(&path), path));
     }
 
     /// Keeps a file that the page sent piece by piece, after it was read without complaint.
@@ -196,14 +196,14 @@ impl Analysis {
     pub fn example(&self, muscle: &str) -> Result<Recordings> {
         let made = record(muscle, 1, &self.folder.join("example"))?;
         let text = std::fs::read_to_string(&made.muscle).map_err(|e| Error::unreadable(&made.muscle, &e))?;
-        self.known().recordings = made.recordings.into_iter().map(|p| (name_of(&p), p)).collect();
+        self.state().recordings = made.recordings.into_iter().map(|p| (name_of(&p), p)).collect();
         Ok(Recordings { muscle: Some(text), ..self.list() })
     }
 
     /// What there is.
     #[must_use]
     pub fn list(&self) -> Recordings {
-        let known = self.known();
+        let known = self.state();
         Recordings {
             recordings: known.recordings.iter().map(|r| r.0.clone()).collect(),
             table: known.table.as_ref().map(|t| t.display().to_string()),
@@ -213,7 +213,7 @@ impl Analysis {
 
     fn one(&self, number: usize) -> Result<(String, Recording)> {
         let (name, path) = self
-            .known()
+            .state()
             .recordings
             .get(number)
             .cloned()
@@ -255,7 +255,7 @@ impl Analysis {
 
     fn read(&self, muscle: &str) -> Result<(MuscleDescription, Campaign, Vec<PathBuf>, Vec<String>)> {
         let muscle = MuscleDescription::parse(muscle)?;
-        let files: Vec<PathBuf> = self.known().recordings.iter().map(|r| r.1.clone()).collect();
+        let files: Vec<PathBuf> = self.state().recordings.iter().map(|r| r.1.clone()).collect();
         let hashes = Arc::new(Hashes::default());
         let campaign =
             Reader { hashes: Some(Arc::clone(&hashes)), ..Reader::of(&muscle) }.campaign(&files)?;
@@ -280,7 +280,7 @@ impl Analysis {
         let lines = lines(&campaign, &fitted.table)?;
         let html = in_page(fit_page::page(&fitted, &campaign, &options).html());
         let name = report_name()?;
-        let mut known = self.known();
+        let mut known = self.state();
         known.table = Some(path.clone());
         let report = Self::keep_report(&mut known, name, html);
         drop(known);
@@ -303,7 +303,7 @@ impl Analysis {
             answer.adopt_blocked_force(plain.summary.blocked_force_N);
         }
         let html = in_page(diagnose_page::page(&answer, &geometry, &campaign).html());
-        let report = Self::keep_report(&mut self.known(), report_name()?, html);
+        let report = Self::keep_report(&mut self.state(), report_name()?, html);
         Ok(Diagnosed { text: pam_report::wording::summary(&answer), report })
     }
 }

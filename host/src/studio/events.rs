@@ -105,7 +105,7 @@ pub(super) fn tell(say: &broadcast::Sender<String>, level: &str, error: &Error) 
 /// What changed since the reference, in one line.
 pub(super) fn compared(update: &Update) -> String {
     let changed = matches!(update, Update::Answer(report) if report.verdict != Verdict::Consistent);
-    Message::Compared { text: update.words(), changed }.line()
+    Message::Compared { text: update.description(), changed }.line()
 }
 
 /// Between what each fitted sensor can read.

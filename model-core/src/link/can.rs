@@ -47,13 +47,13 @@ impl Format {
     /// Bytes of the link that a message carries at most.
     pub const fn data(self) -> usize {
         match self {
-            Self::Fd => PAYLOAD - self.head(),
-            Self::Classic => CLASSIC - self.head(),
+            Self::Fd => PAYLOAD - self.header_length(),
+            Self::Classic => CLASSIC - self.header_length(),
         }
     }
 
     /// The number, and a length where the message's own does not say it.
-    const fn head(self) -> usize {
+    const fn header_length(self) -> usize {
         match self {
             Self::Fd => 2,
             Self::Classic => 1,
@@ -138,7 +138,7 @@ impl Sender {
 
     /// Cuts bytes of the link, such as a whole frame with its closing zero, into messages.
     pub fn send(&mut self, bytes: &[u8], mut message: impl FnMut(&[u8])) {
-        let head = self.format.head();
+        let head = self.format.header_length();
         for piece in bytes.chunks(self.format.data()) {
             let mut payload = [0; PAYLOAD];
             payload[0] = self.number;
@@ -220,7 +220,7 @@ fn parse(payload: &[u8], format: Format) -> Option<(u8, &[u8])> {
         Format::Classic => (rest.len(), rest),
         Format::Fd => rest.split_first().map(|(&length, rest)| (usize::from(length), rest))?,
     };
-    if length == 0 || length > format.data() || payload.len() != padded(format.head() + length) {
+    if length == 0 || length > format.data() || payload.len() != padded(format.header_length() + length) {
         return None;
     }
     Some((number, rest.get(..length)?))

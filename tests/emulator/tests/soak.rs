@@ -63,7 +63,7 @@ const FAULTS: [Fault; 10] = [
 ];
 
 impl Fault {
-    fn words(self) -> &'static str {
+    fn description(self) -> &'static str {
         match self {
             Self::Killed => "the program of the run is stopped by force",
             Self::Suspended => "the computer sleeps for 3 s: all programs stop, then the clock jumps",
@@ -281,7 +281,7 @@ fn every_fault_ends_vented_no_sample_is_missing_unreported_and_nothing_leaks() {
         dropped: rig.line.dropped(),
         recordings: rig.recordings(),
         needs: [first, last],
-        rows: rows.into_iter().map(|(fault, row)| (fault.words(), fault.within(), row)).collect(),
+        rows: rows.into_iter().map(|(fault, row)| (fault.description(), fault.within(), row)).collect(),
     };
     eprintln!("{}", figures.table());
     if std::env::var("PAM_SOAK_PAGE").is_ok_and(|wish| wish == "write") {

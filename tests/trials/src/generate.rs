@@ -16,7 +16,7 @@ use virtual_bench::protocol::{Place, Protocol, Step};
 use virtual_bench::recording::Recording;
 use virtual_bench::rng::Rng;
 
-use self::disturbance::{disturb, mishandle, resample, thin};
+use self::disturbance::{disturb, downsample, mishandle, resample};
 use self::residual::{Base, least_left, rms};
 use self::strength::{Sized, sized};
 
@@ -182,7 +182,7 @@ pub fn pair(spec: &Spec, residuals: &Residuals) -> Pair {
         }
         disturb(&mut files, spec.uneven_noise * b.instruments.force.white, seed);
         mishandle(&mut files, &spec.operator, scale.force, seed);
-        thin(&mut files, spec.lost_rows, seed);
+        downsample(&mut files, spec.lost_rows, seed);
         files
     };
     // Another day: other noise, and other mistakes of the same operator.
@@ -236,7 +236,7 @@ pub fn make(spec: &Spec, residuals: &Residuals) -> Trial {
             }
             disturb(files, spec.uneven_noise * b.instruments.force.white, seed);
             mishandle(files, &spec.operator, scale.force, seed);
-            thin(files, spec.lost_rows, seed);
+            downsample(files, spec.lost_rows, seed);
         }
         let checked = spec.protocol == "C";
         let checks = if checked { checks::all(&b, scale.force, scale.pressure, clock) } else { Vec::new() };

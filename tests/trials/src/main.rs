@@ -13,7 +13,7 @@ mod festo_tables;
 mod figures;
 mod fitted;
 mod generate;
-mod held;
+mod held_length;
 mod inject;
 mod ledger;
 mod limits;
@@ -222,7 +222,7 @@ enum Command {
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
     /// Diagnose muscles of the virtual bench whose length was held, clean ones and with one effect.
-    Held(held::Held),
+    Held(held_length::Held),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
     Reference(reference::Reference),
     /// Diagnose changes between two campaigns of the virtual bench, of which the later one has one effect: a sealed set.
@@ -293,7 +293,7 @@ fn main() -> ExitCode {
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Ablation(ablation) => sensitivity::ablation::run(&ablation),
         Command::Sensors(what) => sensors::run(&what),
-        Command::Held(what) => held::run(&what),
+        Command::Held(what) => held_length::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::ReferenceFurther(what) => reference::further::run(&what),
         Command::ReferenceBench(what) => {

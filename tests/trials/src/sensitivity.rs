@@ -281,7 +281,7 @@ impl<'a> Measurements<'a> {
     }
 }
 
-fn known(names: &[String]) -> Result<(), Box<dyn Error>> {
+fn check_names(names: &[String]) -> Result<(), Box<dyn Error>> {
     let all: BTreeSet<&str> = PAGE.iter().flat_map(|s| s.criteria).map(|c| c.name).collect();
     match names.iter().find(|n| !all.contains(n.as_str())) {
         Some(n) => {
@@ -294,7 +294,7 @@ fn known(names: &[String]) -> Result<(), Box<dyn Error>> {
 
 /// Runs the study and writes `sensitivity.md`.
 pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
-    known(&study.criterion)?;
+    check_names(&study.criterion)?;
     let until = study.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
     let (measurements, nominal) = Measurements::begin(&study.answering)?;
     let measurements = Measurements { until, ..measurements };
@@ -330,8 +330,8 @@ mod tests {
         let all = all_that_decide();
         assert!(all.iter().any(|n| n == "FAMILY_ALPHA"), "{all:?}");
         assert!(!all.iter().any(|n| n == "MOST_REPORTED" || n == "NOISE_SAMPLES"), "{all:?}");
-        assert!(known(&["FAMILY_ALPHA".into()]).is_ok());
-        assert!(known(&["FAMILY_BETA".into()]).is_err());
+        assert!(check_names(&["FAMILY_ALPHA".into()]).is_ok());
+        assert!(check_names(&["FAMILY_BETA".into()]).is_err());
     }
 
     pub(super) fn row(criterion: &str, factor: f64, named: [&str; 2]) -> Row {

@@ -225,7 +225,7 @@ fn memory(shared: &Shared) -> Memory<f32> {
     })
 }
 
-fn again(server: Server<MockFlash>, shared: &Shared) -> Server<MockFlash> {
+fn restarted(server: Server<MockFlash>, shared: &Shared) -> Server<MockFlash> {
     server.restarted(shared).expect("a store")
 }
 
@@ -241,21 +241,21 @@ fn a_memory_is_restored_if_it_is_finite_and_of_this_table() {
         server.store.put_memories(Side::Agonist, 1, &|_| memory).expect("room");
     };
     keep(&mut server, worked);
-    let mut server = again(server, &shared);
+    let mut server = restarted(server, &shared);
     assert_eq!(memory(&shared), worked, "of this table");
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for place in 0..worked.len() {
             let mut broken = worked;
             broken[place] = bad;
             keep(&mut server, broken);
-            server = again(server, &shared);
+            server = restarted(server, &shared);
             assert_eq!(memory(&shared), fresh, "{bad} in place {place}");
         }
     }
     keep(&mut server, worked);
     assert!(send(&mut server, &shared, &remembering()).is_ok());
     assert_eq!(memory(&shared), fresh, "another table, even of the same bytes");
-    let server = again(server, &shared);
+    let server = restarted(server, &shared);
     assert_eq!(memory(&shared), fresh, "also after a restart");
     drop(server);
 }
@@ -296,7 +296,7 @@ fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
     pass(&shared, 10, &mut 0.0);
     let worked = work(&shared, 0.011);
     server.keep(&shared);
-    let mut server = again(server, &shared);
+    let mut server = restarted(server, &shared);
     assert_eq!(memory(&shared), worked, "kept at rest");
     // The allowance of writes is used up at rest; a restart that is requested writes all the same.
     for _ in 0..40 {
@@ -306,7 +306,7 @@ fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
     let last = memory(&shared);
     let mut answers = Answers { server: &mut server, shared: &shared };
     assert_eq!(answers.restart(&(), &mut ()), Ok(()));
-    let server = again(server, &shared);
+    let server = restarted(server, &shared);
     assert_eq!(memory(&shared), last, "kept before a restart");
     drop(server);
 }
@@ -327,14 +327,14 @@ fn kept_settings_come_into_force_at_a_start_and_those_that_cannot_be_used_are_no
     let mut answers = Answers { server: &mut server, shared: &shared };
     assert_eq!(answers.set_settings(&settings, &mut Settings::default()), Ok(()));
     let shared = Shared::new(Settings::default());
-    let mut server = again(server, &shared);
+    let mut server = restarted(server, &shared);
     assert_eq!(shared.with(|controller| *controller.settings()), settings);
     assert_eq!(latched(&shared), None);
     let mut unusable = settings;
     unusable.regulator.gain = f32::NAN;
     assert_eq!(server.store.put_settings(&mut unusable), Ok(()));
     let shared = Shared::new(Settings::default());
-    let server = again(server, &shared);
+    let server = restarted(server, &shared);
     assert_eq!(latched(&shared), Some(Fault::SettingsInvalid));
     assert!(shared.with(|controller| controller.settings().regulator.gain.is_finite()));
     drop(server);

@@ -14,7 +14,7 @@ use crate::menu::opening;
 use crate::purpose::Purpose;
 use crate::rig::Rig;
 use crate::step::{CheckKind, Step};
-use crate::words;
+use crate::wording;
 
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,20 +87,20 @@ impl Engine {
         if self.findings.is_none() {
             return self.first_plan(most, left);
         }
-        let mut plan = Plan { steps: Vec::new(), ends: words::plan_is_full(most), error: None };
+        let mut plan = Plan { steps: Vec::new(), ends: wording::plan_is_full(most), error: None };
         let mut made: Vec<(Step, Option<Recording>)> = Vec::new();
         while plan.steps.len() < most {
             let ranking = self.rank(left, &made);
             plan.error = plan.error.or(ranking.error);
             if ranking.settled && made.is_empty() {
-                plan.ends = words::settled(self.diagnosis.as_ref(), self.purpose);
+                plan.ends = wording::settled(self.diagnosis.as_ref(), self.purpose);
                 break;
             }
             let Some(best) = ranking.steps.first() else {
                 plan.ends = if left < self.shortest() {
-                    words::time_is_over(budget_s)
+                    wording::time_is_over(budget_s)
                 } else {
-                    words::NOTHING_MORE.into()
+                    wording::NOTHING_MORE.into()
                 };
                 break;
             };
@@ -111,7 +111,7 @@ impl Engine {
             left -= best.seconds;
             plan.steps.push(Planned {
                 step: best.step,
-                why: words::why_with_gain(&self.reason(&best.step, &best.gain), &best.gain),
+                why: wording::why_with_gain(&self.reason(&best.step, &best.gain), &best.gain),
                 gain: best.gain,
                 seconds: best.seconds,
             });
@@ -119,7 +119,7 @@ impl Engine {
         if plan.steps.last().is_some_and(|p| p.step != CLOSING) {
             plan.steps.push(Planned {
                 step: CLOSING,
-                why: words::CLOSING.to_owned(),
+                why: wording::CLOSING.to_owned(),
                 gain: Gain::default(),
                 seconds: self.seconds(&CLOSING),
             });
@@ -133,7 +133,7 @@ impl Engine {
         let first = opening(&self.rig).into_iter().map(|(step, why)| (step, why.to_owned()));
         // How long other steps take follows from the free stroke, which the first ones show.
         let further = if self.recordings.is_empty() { 0.0 } else { left };
-        let rest = self.rank(further, &[]).steps.into_iter().map(|w| (w.step, words::NO_TABLE.to_owned()));
+        let rest = self.rank(further, &[]).steps.into_iter().map(|w| (w.step, wording::NO_TABLE.to_owned()));
         for (step, why) in first.chain(rest) {
             let seconds = self.seconds(&step);
             let known = steps.iter().any(|p: &Planned| p.step.name() == step.name());
@@ -142,6 +142,6 @@ impl Engine {
                 steps.push(Planned { step, why, gain: Gain::default(), seconds });
             }
         }
-        Plan { steps, ends: words::PLAN_AGAIN.to_owned(), error: None }
+        Plan { steps, ends: wording::PLAN_AGAIN.to_owned(), error: None }
     }
 }

@@ -13,7 +13,7 @@ use crate::information::{Design, Gain, Knowledge};
 use crate::menu::menu;
 use crate::purpose::Purpose;
 use crate::step::{CheckKind, Step};
-use crate::words;
+use crate::wording;
 
 /// A step and what it is expected to tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,8 +151,8 @@ impl Engine {
     #[must_use]
     pub fn reason(&self, step: &Step, gain: &Gain) -> String {
         if self.findings.is_none() {
-            return words::NO_TABLE.to_owned();
+            return wording::NO_TABLE.to_owned();
         }
-        words::why(gain, self.diagnosis.as_ref(), step)
+        wording::why(gain, self.diagnosis.as_ref(), step)
     }
 }

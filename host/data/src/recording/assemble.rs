@@ -14,8 +14,8 @@ use super::import::{FoundZero, Import, NewRun, Value, Zero};
 use super::plausibility::check;
 use super::quantity::Quantity;
 use super::stroke_zero::{at_largest, first_level, smallest};
+use super::text_column::TextColumn;
 use super::time_of_day;
-use super::words::Words;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -29,8 +29,8 @@ pub(super) struct LookupTable {
 /// Columns of a whole file, by what they are for.
 struct Table {
     quantities: HashMap<Quantity, Vec<f64>>,
-    splits: Vec<Words>,
-    filters: Vec<Words>,
+    splits: Vec<TextColumn>,
+    filters: Vec<TextColumn>,
 }
 
 pub(super) struct Job<'a> {
@@ -104,10 +104,10 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
     let plan = job.plan;
     let mut table = Table {
         quantities: HashMap::new(),
-        splits: vec![Words::default(); job.import.split_by.len()],
-        filters: vec![Words::default(); job.filters.len()],
+        splits: vec![TextColumn::default(); job.import.split_by.len()],
+        filters: vec![TextColumn::default(); job.filters.len()],
     };
-    let mut keys: HashMap<usize, Words> = HashMap::new();
+    let mut keys: HashMap<usize, TextColumn> = HashMap::new();
     for (i, role) in plan.roles.iter().enumerate() {
         let words = std::mem::take(&mut rows.texts[i]);
         match role {
@@ -219,7 +219,7 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
     if keep.iter().any(|k| *k) {
         return Ok(Some(keep));
     }
-    let list = |(words, (name, _)): (&Words, &(String, Value))| {
+    let list = |(words, (name, _)): (&TextColumn, &(String, Value))| {
         let mut values: Vec<String> = words.words.iter().take(LISTED_VALUES).cloned().collect();
         if words.words.len() > LISTED_VALUES {
             values.push(format!("and {} more", words.words.len() - LISTED_VALUES));
@@ -267,8 +267,8 @@ fn needs_rest_length(what: &str) -> Error {
 }
 
 /// The run of each row, counted from 1: one begins where the clock goes back.
-fn runs_of_clock(time: &[f64]) -> Words {
-    let mut runs = Words::default();
+fn runs_of_clock(time: &[f64]) -> TextColumn {
+    let mut runs = TextColumn::default();
     let mut run = 1_usize;
     let mut word = run.to_string();
     for (row, now) in time.iter().enumerate() {
@@ -284,7 +284,7 @@ fn runs_of_clock(time: &[f64]) -> Words {
 type Group = (Vec<String>, Option<Vec<u32>>);
 
 /// The rows of each recording, in the order of first appearance; `None` when a recording is the whole file.
-fn groups(splits: &[Words], keep: Option<&[bool]>, rows: usize) -> Vec<Group> {
+fn groups(splits: &[TextColumn], keep: Option<&[bool]>, rows: usize) -> Vec<Group> {
     if splits.is_empty() {
         let all = keep.map(|k| (0..rows as u32).filter(|r| k[*r as usize]).collect());
         return vec![(Vec::new(), all)];

@@ -12,7 +12,7 @@ use crate::bounds::Budget;
 use crate::error::Error;
 
 use super::cells::{Dialect, LineError, LineMap, Parsed, Wanted, parse};
-use super::words::Words;
+use super::text_column::TextColumn;
 
 /// Small enough for a block and its columns to stay in the second-level cache.
 const BLOCK: usize = 512 << 10;
@@ -94,7 +94,7 @@ impl Blocks {
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     pub numbers: Vec<Vec<f64>>,
-    pub texts: Vec<Words>,
+    pub texts: Vec<TextColumn>,
     pub rows: usize,
     /// Lines count from the first line of the first block, from 0.
     pub map: LineMap,
@@ -125,7 +125,7 @@ impl Rows {
     fn append(&mut self, block: &Parsed, expected_rows: usize) {
         if self.numbers.is_empty() {
             self.numbers = block.numbers.iter().map(|_| Vec::new()).collect();
-            self.texts = vec![Words::default(); block.texts.len()];
+            self.texts = vec![TextColumn::default(); block.texts.len()];
         }
         for (column, part) in self.numbers.iter_mut().zip(&block.numbers) {
             if column.capacity() < column.len() + part.len() {

@@ -2,8 +2,8 @@
 
 use super::decimal;
 use super::line::{Cells, is_blank, is_remark, trim_end};
+use super::text_column::TextColumn;
 use super::usual_line::UsualLine;
-use super::words::Words;
 use crate::date::{DateOrder, time_stamp_in};
 
 /// How a text file is cut into cells.
@@ -101,7 +101,7 @@ pub(super) struct Parsed {
     /// One per requested column; empty for texts.
     pub numbers: Vec<Vec<f64>>,
     /// One per requested column; empty for numbers.
-    pub texts: Vec<Words>,
+    pub texts: Vec<TextColumn>,
     pub rows: usize,
     pub lines: u64,
     pub map: LineMap,
@@ -159,7 +159,7 @@ pub(super) fn parse(
 ) -> Result<Parsed, Box<LineError>> {
     let mut out = Parsed {
         numbers: wanted.iter().map(|_| Vec::new()).collect(),
-        texts: wanted.iter().map(|_| Words::default()).collect(),
+        texts: wanted.iter().map(|_| TextColumn::default()).collect(),
         ..Parsed::default()
     };
     let quick = UsualLine::new(dialect, wanted, width);

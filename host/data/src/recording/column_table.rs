@@ -3,7 +3,7 @@
 use super::blocks::Rows;
 use super::cells::{Want, Wanted};
 use super::import::Missing;
-use super::words::Words;
+use super::text_column::TextColumn;
 use crate::date::time_stamp_in;
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
@@ -78,7 +78,7 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
             }
             _ => length = Some((count, name)),
         }
-        let (mut numbers, mut words) = (Vec::new(), Words::default());
+        let (mut numbers, mut words) = (Vec::new(), TextColumn::default());
         match wanted.want {
             Want::Number { scale, offset } => {
                 numbers = in_si(column, scale, offset, keep.as_deref()).map_err(|e| e.column(name))?;
@@ -161,8 +161,8 @@ fn times(column: &Column, seconds: impl Fn(&str) -> Option<f64>, keep: Option<&[
 }
 
 /// The cells as words.
-fn as_words(column: &Column, keep: Option<&[bool]>) -> Words {
-    let mut words = Words::default();
+fn as_words(column: &Column, keep: Option<&[bool]>) -> TextColumn {
+    let mut words = TextColumn::default();
     match column {
         Column::Numbers(values) => kept(values, keep).for_each(|(_, v)| words.push(&v.to_string())),
         Column::Texts(texts) => kept(texts, keep).for_each(|(_, t)| words.push(t)),

@@ -45,7 +45,7 @@ impl Part {
                 Ok(())
             }
             Err(reason) => {
-                self.cut(self.whole);
+                self.truncate(self.whole);
                 Err(reason)
             }
         }
@@ -58,11 +58,11 @@ impl Part {
             return Ok(());
         }
         self.whole = self.last;
-        self.cut(self.whole);
+        self.truncate(self.whole);
         self.append(end)
     }
 
-    fn cut(&mut self, length: u64) {
+    fn truncate(&mut self, length: u64) {
         // A file that can neither be written nor shortened is left as it is; its reader ends at the last whole piece.
         let _ = self.file.set_len(length);
         let _ = self.file.seek(SeekFrom::Start(length));

@@ -101,7 +101,7 @@ pub(super) fn beside_memory(needed: &Needed, left: f64) -> Missing {
         correction: matches!(needed.effect, Candidate::Bench(_)),
         peak_N: needed.peak,
         p: needed.chance,
-        ..Missing::of(info, probability, Why::Found(Evidence { share, chance, moment: None }))
+        ..Missing::of(info, probability, Why::Found(Evidence { share, chance, change_point: None }))
     }
 }
 

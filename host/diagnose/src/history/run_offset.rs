@@ -93,14 +93,14 @@ fn midpoint(values: &[f64]) -> f64 {
 }
 
 /// The runs of a mounting whose offset is known, with it.
-fn known(points: &Points, mounting: usize, offsets: &[f64]) -> Vec<(usize, f64)> {
+fn known_offsets(points: &Points, mounting: usize, offsets: &[f64]) -> Vec<(usize, f64)> {
     let runs = points.mountings[mounting].runs.iter();
     runs.map(|r| (points.runs[*r].number, offsets[*r])).filter(|o| o.1.is_finite()).collect()
 }
 
 /// A single run that is off, and no other.
 fn bad_run(points: &Points, mounting: usize, offsets: &[f64], deviation: f64) -> Option<Event> {
-    let own = known(points, mounting, offsets);
+    let own = known_offsets(points, mounting, offsets);
     if (own.len() as f64) < BAD_RUN_RUNS {
         return None;
     }
@@ -122,7 +122,7 @@ fn bad_run(points: &Points, mounting: usize, offsets: &[f64], deviation: f64) ->
 
 /// The place at which the offsets of a mounting most likely step, if they do: the refit decides.
 fn candidate(points: &Points, mounting: usize, offsets: &[f64]) -> Option<usize> {
-    let own = known(points, mounting, offsets);
+    let own = known_offsets(points, mounting, offsets);
     if (own.len() as f64) < SLIP_RUNS {
         return None;
     }

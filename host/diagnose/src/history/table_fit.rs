@@ -177,7 +177,8 @@ impl<'a> Prepared<'a> {
             let open = [memory, memory, contact, false, false];
             let better = |s: &Solution| best.as_ref().is_none_or(|b| s.squares < b.solution.squares);
             let found = self.rounds(&problem, Assumed { open, width, earlier_load: None })?;
-            if let Some(found) = found.filter(|f| possible(&f.solution) && better(&f.solution)) {
+            if let Some(found) = found.filter(|f| within_physical_limits(&f.solution) && better(&f.solution))
+            {
                 best = Some(found);
             }
         }
@@ -213,7 +214,9 @@ impl<'a> Prepared<'a> {
         let mut best = without;
         for seconds in TABLE_LOADED {
             let assumed = Assumed { earlier_load: Some(EarlierLoad { pressure, seconds }), ..unloaded };
-            if let Some(found) = self.rounds(problem, assumed)?.filter(|f| possible(&f.solution)) {
+            if let Some(found) =
+                self.rounds(problem, assumed)?.filter(|f| within_physical_limits(&f.solution))
+            {
                 let error = error(&found);
                 if error < least {
                     least = error;
@@ -309,7 +312,7 @@ fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
 }
 
 /// Whether a table may have its deadband.
-fn possible(solution: &Solution) -> bool {
+fn within_physical_limits(solution: &Solution) -> bool {
     f64::from(solution.table.deadband.pascals()) > TABLE_LEAST_DEADBAND
 }
 

@@ -56,7 +56,9 @@ type Sums<const N: usize> = [(f64, [f64; N]); 3];
 
 /// Cuts samples of `N` quantities into chunks, in order of group, finer pressure and contraction.
 #[must_use]
-pub(crate) fn cut<const N: usize>(samples: impl IntoIterator<Item = (Place, [f64; N])>) -> Vec<Chunk<N>> {
+pub(crate) fn in_chunks<const N: usize>(
+    samples: impl IntoIterator<Item = (Place, [f64; N])>,
+) -> Vec<Chunk<N>> {
     let mut sums: BTreeMap<(u32, u32, i64), Sums<N>> = BTreeMap::new();
     for (at, values) in samples {
         let number = (at.contraction * PER_CONTRACTION).floor() as i64;
@@ -96,8 +98,10 @@ mod tests {
     #[test]
     fn branches_count_alike_however_many_rows_each_has() {
         // Three rows up at 2, one down at −1: the mean of the two branches is a half.
-        let chunks = cut([(0.0011, 1.0, 2.0), (0.0012, 1.0, 2.0), (0.0013, 1.0, 2.0), (0.0015, -1.0, -1.0)]
-            .map(|(x, direction, value)| (at(x, direction), [value])));
+        let chunks = in_chunks(
+            [(0.0011, 1.0, 2.0), (0.0012, 1.0, 2.0), (0.0013, 1.0, 2.0), (0.0015, -1.0, -1.0)]
+                .map(|(x, direction, value)| (at(x, direction), [value])),
+        );
         assert_eq!(chunks.len(), 1);
         assert_eq!(chunks[0].branches, [Some([-1.0]), None, Some([2.0])]);
         assert_eq!(chunks[0].mean(), [0.5]);
@@ -106,7 +110,7 @@ mod tests {
     #[test]
     fn a_row_that_noise_puts_beyond_rest_length_is_no_mid_line() {
         let full = (0..60).map(|i| (at(1e-4 * f64::from(i), 1.0), [0.2]));
-        let chunks = cut(full.chain([(at(-1e-5, 1.0), [20.0])]));
+        let chunks = in_chunks(full.chain([(at(-1e-5, 1.0), [20.0])]));
         assert_eq!(chunks.len(), 3);
         assert!(
             chunks.iter().all(|c| (c.mean()[0] - 0.2).abs() < 1e-12 && c.contraction > 0.0),

@@ -12,7 +12,7 @@
 //! only one branch was recorded (then the model's friction replaces the missing branch). Samples just after a reversal lie between
 //! the branches and belong to neither: they count in no mid-line.
 
-use super::chunks::{Place, cut};
+use super::chunks::{Place, in_chunks};
 use super::solution::Solution;
 
 /// A residual, of one row or of the mean of several.
@@ -51,7 +51,7 @@ pub struct ChunkError {
 /// The error of every chunk.
 #[must_use]
 pub(crate) fn by_chunk(samples: impl IntoIterator<Item = Sample>) -> Vec<ChunkError> {
-    cut(samples.into_iter().map(|s| (s.place, [s.residual, s.blocked])))
+    in_chunks(samples.into_iter().map(|s| (s.place, [s.residual, s.blocked])))
         .into_iter()
         .filter_map(|chunk| {
             let [residual, blocked] = chunk.mean();

@@ -77,7 +77,7 @@ pub(crate) mod tests {
     use model_core::table::MAX_ORDER;
 
     /// Loops of a known table at six pressures: a parametrised truth for the solver.
-    pub(crate) fn known(order: usize) -> (Design, Vec<f64>) {
+    pub(crate) fn known_design(order: usize) -> (Design, Vec<f64>) {
         let braid = miniature().build().expect("a valid geometry");
         let levels: Vec<f64> = (0..6).map(|i| 207e3 + 69e3 * f64::from(i)).collect();
         let mut points = Vec::new();
@@ -111,7 +111,7 @@ pub(crate) mod tests {
 
     #[test]
     fn without_noise_the_truth_is_found_to_the_last_digits() {
-        let (design, truth) = known(4);
+        let (design, truth) = known_design(4);
         let weights = vec![1.0; design.rows.len()];
         let mut found = design.start(30e3);
         let normal = design.normal(&found, &weights);
@@ -131,7 +131,7 @@ pub(crate) mod tests {
 
     #[test]
     fn the_jacobian_is_that_of_differences() {
-        let (mut design, mut at) = known(3);
+        let (mut design, mut at) = known_design(3);
         design.extras = 1;
         design.extra = (0..design.rows.len()).map(|i| (i as f64 * 0.37).sin()).collect();
         design.extra_prior = vec![0.0];
@@ -155,7 +155,7 @@ pub(crate) mod tests {
     fn sums_by_bin_are_the_sums_of_rows() {
         for order in 1..=MAX_ORDER {
             for extras in [0, 1] {
-                let (mut design, mut at) = known(order);
+                let (mut design, mut at) = known_design(order);
                 at[3] += 0.7;
                 at[0] += 3e3;
                 design.extras = extras;
@@ -169,7 +169,7 @@ pub(crate) mod tests {
 
     #[test]
     fn leaving_a_group_out_of_the_sums_is_giving_its_points_no_weight() {
-        let (mut design, mut at) = known(4);
+        let (mut design, mut at) = known_design(4);
         at[3] += 0.7;
         // Points of all pressures in turn, so that the sums of a bin are not those of one stretch of rows.
         let n = design.rows.len();

@@ -55,7 +55,7 @@ pub(super) fn choose(described: Solution, open: Solution, muscle: &MuscleDescrip
     let rms = format!("rms {:.2} N as described, {:.2} N with them", before.rms(), after.rms());
     // A comparison that fails for NaN keeps the described dimensions.
     let explained = gain > cost;
-    if explained || (possible(&open, muscle) && !possible(&described, muscle)) {
+    if explained || (within_physical_limits(&open, muscle) && !within_physical_limits(&described, muscle)) {
         let cause = if explained {
             ""
         } else {
@@ -80,7 +80,7 @@ pub(super) fn choose(described: Solution, open: Solution, muscle: &MuscleDescrip
 }
 
 /// Whether a solution gives a table without faults. The uncertainty is not known yet, so every fault counts.
-fn possible(solution: &Solution, muscle: &MuscleDescription) -> bool {
+fn within_physical_limits(solution: &Solution, muscle: &MuscleDescription) -> bool {
     result::table(solution, muscle)
         .is_ok_and(|table| table_faults(&table, None, &FitQuality::default()).is_empty())
 }

@@ -3,7 +3,7 @@
 //! In each chunk ([`super::chunks`]) force and stroke are averaged over both branches and all cycles, each branch first separately. A
 //! chunk with one branch only has that branch's force with the fitted friction taken off.
 
-use super::chunks::cut;
+use super::chunks::in_chunks;
 use super::solution::Solution;
 
 /// One chunk of a mid-line.
@@ -35,7 +35,7 @@ pub fn midline(solution: &Solution) -> Vec<MidPoint> {
         let p = &solution.problem.points.list[i];
         (place, [p.pressure, p.stroke + solution.problem.shift[i], p.force])
     });
-    cut(samples)
+    in_chunks(samples)
         .into_iter()
         .map(|chunk| {
             let [pressure, stroke, mean] = chunk.mean();

@@ -81,11 +81,11 @@ impl Design {
 
 #[cfg(test)]
 mod tests {
-    use crate::fit::gauss_newton::tests::known;
+    use crate::fit::gauss_newton::tests::known_design;
 
     #[test]
     fn a_steep_straight_friction_stays_steep_however_stiff_the_curve() {
-        let (design, truth) = known(3);
+        let (design, truth) = known_design(3);
         let weights = vec![1.0; design.rows.len()];
         let mut found = truth.clone();
         let data = design.normal(&found, &weights);

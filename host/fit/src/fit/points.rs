@@ -206,7 +206,7 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
         Steps { stroke: stroke_step, pressure: pressure_step, rows: most_rows, per_stroke, per_pressure };
     // Many short strokes make many points, of which no more is known of the force: then pieces are longer.
     let (mut list, block) = loop {
-        match cut(screened, motions, &taken, &steps) {
+        match average_stretches(screened, motions, &taken, &steps) {
             Some(cut) => break cut,
             None => steps = steps.longer(),
         }
@@ -248,7 +248,7 @@ impl Steps {
 }
 
 /// The points of a campaign and the number of half-strokes; `None` where there are more than [`MOST`] and longer pieces are possible.
-fn cut(
+fn average_stretches(
     screened: &Screened<'_>,
     motions: &[Motion],
     taken: &dyn Fn(usize) -> bool,

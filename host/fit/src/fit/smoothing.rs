@@ -151,11 +151,11 @@ fn leave_out(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::gauss_newton::tests::known;
+    use crate::fit::gauss_newton::tests::known_design;
 
     #[test]
     fn the_quadratic_short_cut_is_the_refit_itself() {
-        let (mut design, mut parameters) = known(3);
+        let (mut design, mut parameters) = known_design(3);
         for (i, row) in design.rows.iter_mut().enumerate() {
             row.force += 0.3 * (i as f64 * 1.7).sin();
         }
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn straight_curves_are_found_to_be_straight() {
-        let (mut design, parameters) = known(2);
+        let (mut design, parameters) = known_design(2);
         for (i, row) in design.rows.iter_mut().enumerate() {
             row.force += 0.5 * (i as f64 * 12.9898).sin();
         }

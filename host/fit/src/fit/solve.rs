@@ -50,7 +50,8 @@ pub(super) fn solve(
         recording.require_force()?;
     }
     progress.stage("finding strokes and reversals", 0);
-    let Cut { points, clips, outliers, braid, geometry, mut warnings } = cut(campaign, muscle, options)?;
+    let Selected { points, clips, outliers, braid, geometry, mut warnings } =
+        select_points(campaign, muscle, options)?;
     let max_pressure = muscle.max_pressure_kPa.map_or(points.pressure.high, |kpa| kpa * 1e3);
     let screen = Screen::without_model(&points, clips, outliers);
     let ingredients =
@@ -72,7 +73,7 @@ pub(super) fn solve(
 }
 
 /// What the search needs of a campaign.
-struct Cut {
+struct Selected {
     points: Points,
     clips: (Option<Clip>, Option<Clip>),
     outliers: Vec<Outlier>,
@@ -86,7 +87,7 @@ struct Cut {
 ///
 /// # Errors
 /// Recordings that cannot be those of this muscle.
-fn cut(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<Cut> {
+fn select_points(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Result<Selected> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
     let mut points = points(&screened, &Motion::of_campaign(campaign));
@@ -96,7 +97,7 @@ fn cut(campaign: &Campaign, muscle: &MuscleDescription, options: &Options) -> Re
     check_contractions(&points, campaign, &braid)?;
     let outliers = despike(campaign, &mut points);
     let warnings = campaign.warnings.iter().cloned().chain(screened.remark()).collect();
-    Ok(Cut { points, clips: screen::clip(campaign), outliers, geometry, braid, warnings })
+    Ok(Selected { points, clips: screen::clip(campaign), outliers, geometry, braid, warnings })
 }
 
 /// # Errors

@@ -2,7 +2,7 @@
 
 use crate::history_text::{assumed, why_not, with_half};
 use crate::wording::history as wording;
-use crate::{Axis, Colour, Figure, Mark, Panel, Section, Table, figures, fixed};
+use crate::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed, significant};
 use pam_diagnose::history::History;
 
 /// The chapter; empty where the campaign has no history.
@@ -72,7 +72,7 @@ fn run_in(h: &History) -> Figure {
             let own = h.runs.iter().filter(|r| r.mounting == m.number);
             let (x, y): (Vec<f64>, Vec<f64>) =
                 own.map(|r| (r.run as f64, if after { r.mean_after_N } else { r.mean_before_N })).unzip();
-            let name = format!("{} mm", figures(m.length_mm, 4));
+            let name = format!("{} mm", significant(m.length_mm, 4));
             panel = panel.line(name, Colour::Series(m.number - 1), &x, &y);
         }
         panel.with("", Colour::Muted, Mark::Level(0.0))
@@ -95,7 +95,7 @@ fn courses(h: &History) -> Figure {
         .map(|c| {
             // The curve is the same on filling and emptying: only the memory moves it.
             Panel::new(Axis::new("time since the mounting", "s"), Axis::new("force", "N"))
-                .titled(format!("{} mm", figures(c.length_mm, 4)))
+                .titled(format!("{} mm", significant(c.length_mm, 4)))
                 .points("measured", Colour::Muted, &c.time_s, &c.force_N)
                 .line("law", Colour::Series(1), &c.time_s, &c.law_N)
         })
@@ -148,7 +148,7 @@ fn mountings(h: &History) -> Table {
     for m in &h.mountings {
         table.row([
             m.number.to_string(),
-            figures(m.length_mm, 4),
+            significant(m.length_mm, 4),
             fixed(100.0 * m.contraction, 1),
             m.runs.to_string(),
             fixed(m.threshold_kPa, 0),

@@ -1,6 +1,6 @@
 //! Where the model is wrong: along each coordinate, and over time.
 
-use crate::{Axis, Colour, Figure, Mark, Panel, Section, figures, residual_table, wording};
+use crate::{Axis, Colour, Figure, Mark, Panel, Section, residual_table, significant, wording};
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Profile};
 use pam_fit::RecordingResidual;
@@ -75,7 +75,7 @@ pub(super) fn section(d: &Diagnosis, residuals: &[RecordingResidual]) -> Section
         section.text("The error is spread evenly: no region of any coordinate holds more than its share.");
     } else {
         section.list(
-            d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), figures(r.p, 2))),
+            d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), significant(r.p, 2))),
         );
     }
     // The coordinates where the misfit is concentrated come first, then the others that were examined.

@@ -3,7 +3,7 @@
 use pam_diagnose::verdict::{Diagnosis, Pattern, Verdict};
 
 use super::super::wording;
-use super::super::{Section, Table, figures, fixed};
+use super::super::{Section, Table, fixed, significant};
 
 /// The error that no named effect explains, and the effects that could be hidden.
 pub(super) fn remains(d: &Diagnosis) -> Section {
@@ -53,7 +53,7 @@ pub(super) fn next(d: &Diagnosis) -> Section {
             "{} It separates {} by up to {} N.",
             wording::sentence(&wording::proposal(&n.proposal)),
             separates.join(" and "),
-            figures(n.expected_difference_N, 2)
+            significant(n.expected_difference_N, 2)
         ));
         if !n.protocol.is_empty() {
             section.listing(n.protocol.clone());
@@ -80,9 +80,9 @@ pub(super) fn considered(d: &Diagnosis) -> Section {
                 step.runners_up.iter().take(3).map(|(name, _)| format!("`{name}`")).collect();
             table.row([
                 format!("`{}`", step.effect),
-                figures(step.rms_N, 3),
-                step.held_out_rms_N.map_or_else(|| "–".to_owned(), |e| figures(e, 3)),
-                figures(step.p, 2),
+                significant(step.rms_N, 3),
+                step.held_out_rms_N.map_or_else(|| "–".to_owned(), |e| significant(e, 3)),
+                significant(step.p, 2),
                 competitors.join(", "),
             ]);
         }

@@ -1,6 +1,6 @@
 //! The force that a controller with this table produces, and its error.
 
-use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
+use super::super::{Axis, Colour, Figure, Panel, Section, fixed, significant};
 use super::view::{Banded, View};
 
 /// Contractions at which the force is looked at, shares of the tested range.
@@ -17,9 +17,9 @@ pub(super) fn section(view: &View<'_>) -> Section {
         "For a force setpoint the controller takes the pressure at which the table gives that force. The 95 % confidence interval of \
          the table adds an error of at most ± {} N ({} % of the blocked force). Single readings scatter by ± {} N (95 %) about the \
          model. The valve's error is not included.",
-        figures(worst, 2),
-        figures(100.0 * worst / blocked.max(f64::MIN_POSITIVE), 2),
-        figures(pam_fit::confidence_band::HALF_95 * view.fit.summary.rms_N, 2)
+        significant(worst, 2),
+        significant(100.0 * worst / blocked.max(f64::MIN_POSITIVE), 2),
+        significant(pam_fit::confidence_band::HALF_95 * view.fit.summary.rms_N, 2)
     ));
     section.figure(pressure_for_force(view, &places));
     section.figure(error_of_force(view, &places));
@@ -112,7 +112,7 @@ fn error_of_force(view: &View<'_>, places: &[Place]) -> Figure {
     let spread = match view.fit.summary.left_out_pressure_mean_error_pct {
         Some(unseen) => format!(
             " At held-out pressures the mean error was {} % of the blocked force.",
-            figures(unseen, 2)
+            significant(unseen, 2)
         ),
         None => String::new(),
     };

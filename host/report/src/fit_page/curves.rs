@@ -1,6 +1,6 @@
 //! What was fitted, over pressure and over strain.
 
-use super::super::{Axis, Colour, Figure, Panel, Section, figures, fixed};
+use super::super::{Axis, Colour, Figure, Panel, Section, fixed, significant};
 use super::view::{Banded, View};
 use pam_fit::confidence_band::HALF_95;
 use pam_fit::table_root;
@@ -151,7 +151,7 @@ fn stress(view: &View<'_>) -> Figure {
 pub(super) fn with_interval(value: f64, std: f64) -> String {
     let half = 1.96 * std;
     if !(half > 0.0 && half.is_finite()) {
-        return figures(value, 3);
+        return significant(value, 3);
     }
     let decimals = (1 - half.log10().floor() as i32).clamp(0, 6) as usize;
     format!("{} ± {}", fixed(value, decimals), fixed(half, decimals))

@@ -1,7 +1,7 @@
 //! Load lines, loops, blocked force and free contraction, the deadband line.
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
-use super::held;
+use super::held_length;
 use super::view::{Banded, View};
 use pam_data::pluralise::pluralise;
 use pam_fit::columns;
@@ -16,13 +16,13 @@ pub(super) fn contraction_axis() -> Axis {
 /// The picture that stands first.
 pub(super) fn overview(view: &View<'_>) -> Section {
     let mut section = Section::new("Measured and fitted force");
-    section.figure(if view.held_length() { held::load_lines(view) } else { load_lines(view) });
+    section.figure(if view.held_length() { held_length::load_lines(view) } else { load_lines(view) });
     section
 }
 
 pub(super) fn section(view: &View<'_>) -> Section {
     let mut section = Section::new("Force of the muscle");
-    section.figure(if view.held_length() { held::branches(view) } else { loops(view) });
+    section.figure(if view.held_length() { held_length::branches(view) } else { loops(view) });
     section.figure(ends(view));
     section.figure(deadband(view));
     section
@@ -255,7 +255,7 @@ fn deadband(view: &View<'_>) -> Figure {
     let (p0, half) = (s.deadband_kPa, 1.96 * s.deadband_std_kPa);
     let top = view.levels.last().map_or(1.0, |p| p / 1e3);
     let (x, y): (Vec<f64>, Vec<f64>) = if view.held_length() {
-        held::at_rest_length(view)
+        held_length::at_rest_length(view)
     } else {
         repeats(view).iter().filter_map(|r| Some((view.levels[r.group] / 1e3, r.blocked?))).unzip()
     };

@@ -1,7 +1,7 @@
 //! The thesis's models and the table side by side: errors, load lines, error against contraction.
 
-use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, figures};
-use super::held;
+use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, significant};
+use super::held_length;
 use super::loads::{PANELS, contraction_axis};
 use super::view::View;
 
@@ -24,9 +24,9 @@ pub(super) fn section(view: &View<'_>) -> Section {
     }
     section.table(table);
     if view.held_length() {
-        section.figure(held::each_model(view));
-        section.figure(held::models(view));
-        section.figure(held::errors(view));
+        section.figure(held_length::each_model(view));
+        section.figure(held_length::models(view));
+        section.figure(held_length::errors(view));
     } else {
         section.figure(each(view));
         section.figure(against_midline(view));
@@ -37,7 +37,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
 
 /// An error in percent; beyond ten times the blocked force its digits carry nothing.
 fn error(percent: f64) -> String {
-    if percent <= 1e3 { figures(percent, 2) } else { "> 1000".to_owned() }
+    if percent <= 1e3 { significant(percent, 2) } else { "> 1000".to_owned() }
 }
 
 /// A model's forces with gaps where they are far beyond what was measured: one model that fails must not set the scale of all.

@@ -1,6 +1,6 @@
 //! Parameters: values with intervals, which are not identifiable and why, correlations.
 
-use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, Tone, figures, fixed};
+use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, Tone, fixed, significant};
 use super::curves::with_interval;
 use super::view::View;
 
@@ -53,11 +53,11 @@ pub(super) fn section(view: &View<'_>) -> Section {
     for p in &s.pressures {
         pressures.row([
             fixed(p.pressure_kPa, 0),
-            figures(p.blocked_force_N, 4),
+            significant(p.blocked_force_N, 4),
             p.free_contraction.map_or("–".into(), |c| format!("{} %", fixed(100.0 * c, 2))),
-            figures(p.mean_error_pct, 2),
-            figures(p.max_error_pct, 2),
-            p.left_out_mean_error_pct.map_or("–".into(), |e| figures(e, 2)),
+            significant(p.mean_error_pct, 2),
+            significant(p.max_error_pct, 2),
+            p.left_out_mean_error_pct.map_or("–".into(), |e| significant(e, 2)),
             fixed(p.samples as f64, 0),
         ]);
     }
@@ -71,7 +71,7 @@ fn identifiability(view: &View<'_>, section: &mut Section) {
     match s.condition {
         Some(condition) => section.text(format!(
             "The elastic columns have a condition number of {}: {}",
-            figures(condition, 2),
+            significant(condition, 2),
             if condition > 300.0 {
                 "over this stroke they are similar, so single E_{k} are poorly determined. Their sum, which the controller uses, is \
                  determined much better."

@@ -2,7 +2,7 @@
 
 use model_core::units::{Length, Pressure};
 
-use super::super::{Colour, figures, fixed};
+use super::super::{Colour, fixed, significant};
 use pam_data::recording::Campaign;
 use pam_fit::Fit;
 use pam_fit::Point;
@@ -194,7 +194,11 @@ impl<'a> View<'a> {
     pub fn worst_place(&self) -> String {
         let worst = self.fit.chunks.iter().max_by(|a, b| a.percent.abs().total_cmp(&b.percent.abs()));
         worst.map_or(String::new(), |c| {
-            format!("at {}, contraction {} %", self.name(c.group as usize), figures(100.0 * c.contraction, 2))
+            format!(
+                "at {}, contraction {} %",
+                self.name(c.group as usize),
+                significant(100.0 * c.contraction, 2)
+            )
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Why an effect is named.
 
-use pam_diagnose::why::{Chance, Evidence, Moment, UnseenError, Why};
+use pam_diagnose::why::{Chance, ChangePoint, Evidence, UnseenError, Why};
 
 /// The reason as text without its full stop.
 #[must_use]
@@ -50,9 +50,10 @@ fn evidence(e: &Evidence) -> String {
             times(log_ratio)
         ),
     };
-    let moment = e.moment.as_ref().map_or(String::new(), |m| format!("; it happened {}", moment(m)));
+    let change =
+        e.change_point.as_ref().map_or(String::new(), |c| format!("; it happened {}", change_point(c)));
     format!(
-        "it explains {:.0} % of the excess error with the model refitted; {chance}{moment}",
+        "it explains {:.0} % of the excess error with the model refitted; {chance}{change}",
         100.0 * e.share
     )
 }
@@ -61,12 +62,12 @@ fn unseen(u: &UnseenError) -> String {
     format!("error on held-out rows: {:.3} N without it, {:.3} N with it", u.without, u.with)
 }
 
-fn moment(m: &Moment) -> String {
+fn change_point(m: &ChangePoint) -> String {
     match m {
-        Moment::Before(name) => format!("before {name} began"),
-        Moment::After(name) => format!("after the end of {name}"),
-        Moment::Between(a, b) => format!("between {a} and {b}"),
-        Moment::In(name, seconds) => format!("in {name}, {seconds:.1} s after its first reading"),
+        ChangePoint::Before(name) => format!("before {name} began"),
+        ChangePoint::After(name) => format!("after the end of {name}"),
+        ChangePoint::Between(a, b) => format!("between {a} and {b}"),
+        ChangePoint::In(name, seconds) => format!("in {name}, {seconds:.1} s after its first reading"),
     }
 }
 
@@ -89,7 +90,7 @@ mod tests {
         let found = Evidence {
             share: 0.83,
             chance: Chance::FewStrokes { p: 0.2, log_ratio: 1e3 },
-            moment: Some(Moment::In("run-2".into(), 3.04)),
+            change_point: Some(ChangePoint::In("run-2".into(), 3.04)),
         };
         let text = why(&Why::GivenSupported(found, unseen));
         assert!(text.starts_with("given, and the recordings support it: it explains 83 %"), "{text}");

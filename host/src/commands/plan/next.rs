@@ -84,7 +84,7 @@ fn document<'a>(
         bench::PlannedStep {
             number: at + 1,
             name: p.step.name(),
-            what: p.step.words(),
+            what: p.step.description(),
             why: p.why.clone(),
             seconds: p.seconds,
             table_nats: p.gain.table,

@@ -84,7 +84,7 @@ impl Connected {
         let emulated = Emulated::start(stand, None, 1.0)?;
         let address = emulated.address().clone();
         let client = Client::open(&address)?;
-        let words = emulated.words();
+        let words = emulated.description();
         Ok((Self::new(address, client, Some((emulated, mishap)))?, words))
     }
 

@@ -95,7 +95,8 @@ fn each_is_lost(format: Format) {
         });
         let (frames, counts) = arrived(format, rest);
         // The zero behind a gap is as good as a closing zero that was alone in its message.
-        let whole = sent.iter().flatten().nth(lost).is_some_and(|message| message[format.head()..] == [0]);
+        let whole =
+            sent.iter().flatten().nth(lost).is_some_and(|message| message[format.header_length()..] == [0]);
         assert_eq!(frames, expected(its.filter(|_| !whole)), "message {lost}");
         // The last one of all is not missed.
         assert_eq!(counts.lost, u32::from(lost + 1 < total));

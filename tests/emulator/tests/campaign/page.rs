@@ -13,7 +13,7 @@ pub enum Kind {
 impl Kind {
     pub const ALL: [Self; 3] = [Self::Process, Self::Cable, Self::Controller];
 
-    const fn words(self) -> &'static str {
+    const fn description(self) -> &'static str {
         match self {
             Self::Process => "SIGKILL to the program",
             Self::Cable => "serial cable pulled",
@@ -67,7 +67,7 @@ impl Figures {
             let _ = writeln!(
                 body,
                 "| {} | {} | {} | {} | {} | {vented} |",
-                kind.words(),
+                kind.description(),
                 of.len(),
                 of.iter().filter(|i| i.under_pressure).count(),
                 of.iter().map(|i| i.rows).sum::<usize>(),

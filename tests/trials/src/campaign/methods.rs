@@ -44,7 +44,7 @@ impl Method {
     pub const ALL: [Self; 4] = [Self::Chosen, Self::Complete, Self::Random, Self::Proposed];
 
     /// As text.
-    pub const fn words(self) -> &'static str {
+    pub const fn description(self) -> &'static str {
         match self {
             Self::Chosen => "steps chosen by expected information",
             Self::Complete => "protocol C for the same time, with its checks",
@@ -85,7 +85,7 @@ impl Drop for Scratch {
     }
 }
 
-fn words(e: pam_data::error::Error) -> String {
+fn message(e: pam_data::error::Error) -> String {
     e.to_string()
 }
 
@@ -114,8 +114,8 @@ pub fn record(method: Method, spec: &Spec, made: &Made, bench_s: f64) -> Result<
 
 /// Asks the diagnosis about what was recorded.
 pub fn ask(method: Method, made: &Made, recorded: &Recorded) -> Result<Said, String> {
-    let muscle = MuscleDescription::parse(&made.description).map_err(words)?;
-    let d = diagnosed(&recorded.recordings, &muscle, &recorded.checks).map_err(words)?;
+    let muscle = MuscleDescription::parse(&made.description).map_err(message)?;
+    let d = diagnosed(&recorded.recordings, &muscle, &recorded.checks).map_err(message)?;
     let sets = d
         .missing
         .iter()
@@ -144,10 +144,10 @@ fn rig() -> Rig {
 }
 
 fn chosen(made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String> {
-    let muscle = MuscleDescription::parse(&made.description).map_err(words)?;
-    let mut engine = Engine::new(muscle, rig(), Purpose::Both, bench_s).map_err(words)?;
+    let muscle = MuscleDescription::parse(&made.description).map_err(message)?;
+    let mut engine = Engine::new(muscle, rig(), Purpose::Both, bench_s).map_err(message)?;
     let mut bench = VirtualBench::new(&made.truth.bench);
-    let course = simulate(&mut engine, &mut bench, Some(&folder.0)).map_err(words)?;
+    let course = simulate(&mut engine, &mut bench, Some(&folder.0)).map_err(message)?;
     let checks = course.iter().filter(|d| matches!(d.chosen.step, Step::Check { .. }));
     Ok(Recorded {
         recordings: engine.recordings().to_vec(),
@@ -161,8 +161,8 @@ fn chosen(made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String
 
 /// The first steps, then steps drawn without regard to what they tell.
 fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String> {
-    let muscle = MuscleDescription::parse(&made.description).map_err(words)?;
-    let mut places = Places::new(&muscle, &rig()).map_err(words)?;
+    let muscle = MuscleDescription::parse(&made.description).map_err(message)?;
+    let mut places = Places::new(&muscle, &rig()).map_err(message)?;
     let mut bench = VirtualBench::new(&made.truth.bench);
     let mut r = Rng::stream(spec.seed, "random menu");
     let (mut recordings, mut checks) = (Vec::new(), Vec::new());
@@ -186,7 +186,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
         };
         number += 1;
         if let Step::Check { check } = step {
-            if let Some(csv) = bench.check(check, places.blocked, places.top).map_err(words)? {
+            if let Some(csv) = bench.check(check, places.blocked, places.top).map_err(message)? {
                 checks.push(written(&folder.0, check.file(), &csv)?);
             }
             made_checks.push(check);
@@ -199,7 +199,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
             }
             Ok(true)
         };
-        bench.perform(&step.course(&places), &mut take).map_err(words)?;
+        bench.perform(&step.course(&places), &mut take).map_err(message)?;
         let recorded = recording(&step.name(), &rows);
         match step {
             Step::BlockedRamp => places.learn_ramp(&recorded),
@@ -219,7 +219,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
 }
 
 fn proposed(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String> {
-    let muscle = MuscleDescription::parse(&made.description).map_err(words)?;
+    let muscle = MuscleDescription::parse(&made.description).map_err(message)?;
     let clean = Muscle::new(spec.bench.muscle.clone());
     let levels = campaigns::levels(&clean);
     let mut bench = Bench::new(&made.truth.bench);
@@ -227,10 +227,10 @@ fn proposed(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<R
     let named = |f: &virtual_bench::recording::Recording| (f.name.clone(), f.rows.clone());
     let first: Vec<(String, Vec<Row>)> = files.iter().map(named).collect();
     let recordings = until(first.iter().map(|f| (f.0.as_str(), f.1.as_slice())), bench_s);
-    let d = diagnosed(&recordings, &muscle, &[]).map_err(words)?;
+    let d = diagnosed(&recordings, &muscle, &[]).map_err(message)?;
     if let Some(findings) = fitted(&recordings, &muscle) {
         let (low, high) = (levels[0], levels[levels.len() - 1]);
-        let next = next_experiment(&d, &findings.model, low, high).map_err(words)?;
+        let next = next_experiment(&d, &findings.model, low, high).map_err(message)?;
         if let Some(Ok(next)) = next.map(|n| Protocol::from_toml(&n.protocol)) {
             files.extend(bench.run(&next).map_err(|e| e.to_string())?);
         }

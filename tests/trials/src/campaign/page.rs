@@ -44,7 +44,7 @@ pub fn page(all: &[Trial], drawn: usize) -> String {
         let _ = writeln!(
             m,
             "| {} | {} | {} | {} | {} | {} | {} |",
-            method.words(),
+            method.description(),
             hidden.len() + nulls.len(),
             rate(&|h| h.1.resolved(&h.0), hidden.len()),
             rate(&|h| h.1.class_right(&h.0), hidden.len()),

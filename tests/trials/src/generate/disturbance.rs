@@ -9,7 +9,7 @@ use virtual_bench::rng::Rng;
 const RATE: f64 = 10.0;
 
 /// Lose some rows: uneven sampling.
-pub(super) fn thin(files: &mut [Recording], part: f64, seed: u64) {
+pub(super) fn downsample(files: &mut [Recording], part: f64, seed: u64) {
     if part <= 0.0 {
         return;
     }

@@ -55,7 +55,7 @@ fn seal(configuration: &str) -> &str {
 }
 
 /// Another seal is another friction; another bore another gain.
-fn known(a: &str, b: &str) -> BTreeSet<Class> {
+fn known_classes(a: &str, b: &str) -> BTreeSet<Class> {
     let mut all = BTreeSet::new();
     if a.contains("257") != b.contains("257") {
         all.insert(Class::Gain);
@@ -95,7 +95,7 @@ pub fn run(data: &Path, short: bool) -> Result<Vec<Pair>, Box<dyn Error>> {
         Ok(Pair {
             before: (*before).into(),
             after: (*after).into(),
-            known: known(before, after),
+            known: known_classes(before, after),
             named: report.missing.iter().map(|m| m.class).collect(),
             none: report.probability("none"),
         })

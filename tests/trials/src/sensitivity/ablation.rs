@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Answering, Measurements, Row, UNMEASURED, known};
+use super::{Answering, Measurements, Row, UNMEASURED, check_names};
 use crate::ledger::{self, Ledger};
 use crate::rate::Rate;
 
@@ -60,7 +60,7 @@ pub fn run(ablation: &Ablation) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     for rule in &RULES {
         let group: Vec<String> = rule.criteria.iter().map(|c| (*c).to_owned()).collect();
-        known(&group)?;
+        check_names(&group)?;
         rows.push((rule, measurements.row(&group, rule.factor)?.ok_or(UNMEASURED)?));
     }
     let page = markdown(&ledger::read_ledger(&ablation.answering.set)?, &nominal, &rows);

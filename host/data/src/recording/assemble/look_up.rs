@@ -6,7 +6,7 @@ use super::super::blocks::Rows;
 use super::super::cells::Want;
 use super::super::column_plan::{LookedUp, Role};
 use super::super::import::Lookup;
-use super::super::words::Words;
+use super::super::text_column::TextColumn;
 use super::{Job, LookupTable, Table, number, same};
 use crate::date::time_stamp_in;
 use crate::error::{DataCode, Error, Result};
@@ -16,7 +16,7 @@ pub(super) fn look_up(
     job: &Job<'_>,
     rows: &Rows,
     table: &mut Table,
-    keys: &HashMap<usize, Words>,
+    keys: &HashMap<usize, TextColumn>,
     lookup: &LookupTable,
 ) -> Result<()> {
     let Some(described) = &job.import.lookup else { return Ok(()) };
@@ -44,7 +44,7 @@ fn lines_of_rows<'a>(
     job: &Job<'_>,
     described: &Lookup,
     rows: &Rows,
-    keys: &HashMap<usize, Words>,
+    keys: &HashMap<usize, TextColumn>,
     lookup: &'a LookupTable,
 ) -> Result<Vec<&'a Vec<String>>> {
     let file = job.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();

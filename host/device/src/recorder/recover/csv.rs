@@ -33,7 +33,7 @@ pub(super) fn copy<R: Read>(source: &mut Window<R>, out: &mut impl Write) -> io:
         let line = ahead[..end.map_or(ahead.len(), |e| e + 1)].to_vec();
         source.skip(line.len());
         let Some(names) = &header else {
-            let (names, found) = head(&line, source)?;
+            let (names, found) = read_header(&line, source)?;
             if !found {
                 lost.add(number, line.len(), 0);
             }
@@ -87,7 +87,7 @@ impl Lost<'_> {
 }
 
 /// The names of the columns; where the first line holds none, those of a recording with as many columns as the next line.
-fn head<R: Read>(line: &[u8], source: &mut Window<R>) -> io::Result<(Vec<String>, bool)> {
+fn read_header<R: Read>(line: &[u8], source: &mut Window<R>) -> io::Result<(Vec<String>, bool)> {
     let split = |text: &str| text.trim_end().split(',').map(str::to_owned).collect::<Vec<_>>();
     if let Ok(text) = std::str::from_utf8(line)
         && text.ends_with('\n')

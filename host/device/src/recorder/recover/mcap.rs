@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::super::mcap::{END, Encoder};
 use super::Tally;
 use super::window::Window;
-use pam_data::mcap_records::{Chunk, HEAD, LARGEST, MAGIC, head, kind, message, plausible};
+use pam_data::mcap_records::{Chunk, HEAD, LARGEST, MAGIC, header, kind, message, plausible};
 
 /// Largest record beside chunks that is taken over: the header, metadata, the attached side file.
 const LARGEST_OTHER: u64 = 4 << 20;
@@ -59,7 +59,7 @@ pub(super) fn copy<R: Read>(source: &mut Window<R>, out: &mut impl Write) -> io:
         }
     }
     copy.tally.samples_lost += uncounted;
-    copy.head()?;
+    copy.header()?;
     copy.out.write_all(&END)?;
     Ok(copy.tally)
 }
@@ -92,7 +92,7 @@ impl<W: Write> Copy<'_, W> {
             }
             _ => {}
         }
-        self.head()?;
+        self.header()?;
         self.out.write_all(record)?;
         Ok(counted)
     }
@@ -106,7 +106,7 @@ impl<W: Write> Copy<'_, W> {
     }
 
     /// A file without its header gets one.
-    fn head(&mut self) -> io::Result<()> {
+    fn header(&mut self) -> io::Result<()> {
         if !std::mem::replace(&mut self.headed, true) {
             self.out.write_all(&own(kind::HEADER)?)?;
         }
@@ -115,7 +115,7 @@ impl<W: Write> Copy<'_, W> {
 
     /// Messages need the channels that a damaged chunk held: those of every recording of `host record` are the same.
     fn channels(&mut self) -> io::Result<()> {
-        self.head()?;
+        self.header()?;
         if !std::mem::replace(&mut self.channels, true) {
             self.out.write_all(&own(kind::CHUNK)?)?;
         }
@@ -127,7 +127,7 @@ impl<W: Write> Copy<'_, W> {
 fn own(wanted: u8) -> io::Result<Vec<u8>> {
     let begun = Encoder::new(&Value::Null, 0).and_then(|mut e| e.take()).map_err(io::Error::other)?;
     let mut rest = &begun[MAGIC.len()..];
-    while let Some((kind, length)) = head(rest) {
+    while let Some((kind, length)) = header(rest) {
         let (record, after) = rest.split_at_checked(HEAD + length as usize).unwrap_or((rest, &[]));
         if kind == wanted {
             return Ok(record.to_vec());
@@ -138,7 +138,7 @@ fn own(wanted: u8) -> io::Result<Vec<u8>> {
 }
 
 fn read_head<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
-    let Some((kind, length)) = head(source.peek(HEAD)?) else { return Ok(Found::Damage) };
+    let Some((kind, length)) = header(source.peek(HEAD)?) else { return Ok(Found::Damage) };
     let most = if kind == kind::CHUNK { LARGEST } else { LARGEST_OTHER };
     if length > most {
         return Ok(Found::Damage);
@@ -195,9 +195,9 @@ fn chunk_here<R: Read>(source: &mut Window<R>) -> io::Result<Option<bool>> {
     /// The parts of a chunk before its records, uncompressed as ours are.
     const BEFORE: usize = HEAD + 40;
     let start = source.peek(BEFORE)?;
-    let number = |at: usize| start.get(at..at + 8).and_then(|b| head(&[&[0], b].concat())).map(|(_, n)| n);
+    let number = |at: usize| start.get(at..at + 8).and_then(|b| header(&[&[0], b].concat())).map(|(_, n)| n);
     let (Some((kind::CHUNK, length)), Some(uncompressed), Some(records)) =
-        (head(start), number(HEAD + 16), number(HEAD + 32))
+        (header(start), number(HEAD + 16), number(HEAD + 32))
     else {
         return Ok(None);
     };
@@ -212,11 +212,11 @@ fn chunk_here<R: Read>(source: &mut Window<R>) -> io::Result<Option<bool>> {
 /// Messages in a damaged chunk at this position, as far as their lengths lead.
 fn countable<R: Read>(source: &mut Window<R>) -> io::Result<u64> {
     const BEFORE: usize = HEAD + 40;
-    let Some((kind::CHUNK, length)) = head(source.peek(HEAD)?) else { return Ok(0) };
+    let Some((kind::CHUNK, length)) = header(source.peek(HEAD)?) else { return Ok(0) };
     let bytes = source.peek(HEAD + length.min(LARGEST) as usize)?;
     let mut rest = bytes.get(BEFORE..).unwrap_or_default();
     let mut count = 0;
-    while let Some((kind, length)) = head(rest) {
+    while let Some((kind, length)) = header(rest) {
         let body = rest.get(HEAD..).and_then(|r| r.get(..usize::try_from(length).ok()?));
         let (kind::SCHEMA..=kind::MESSAGE, Some(body)) = (kind, body) else { break };
         count += u64::from(kind == kind::MESSAGE);

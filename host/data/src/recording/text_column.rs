@@ -4,13 +4,13 @@ use std::collections::HashMap;
 
 /// Texts as numbers into a vocabulary.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Words {
+pub(super) struct TextColumn {
     pub codes: Vec<u32>,
     pub words: Vec<String>,
     index: HashMap<String, u32>,
 }
 
-impl Words {
+impl TextColumn {
     pub(super) fn push(&mut self, word: &str) {
         let code = self.code(word);
         self.codes.push(code);
