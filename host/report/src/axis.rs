@@ -229,7 +229,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 /// A number with about `digits` significant figures, in the usual notation.
 ///
 /// ```
-/// use pam_report::figures;
+/// use pam_report::significant;
 /// assert_eq!(significant(0.041_87, 2), "0.042");
 /// assert_eq!(significant(135.71, 3), "136");
 /// assert_eq!(significant(1.234e-9, 3), "1.23·10^{−9}");

@@ -44,6 +44,7 @@ use pam_report::{diagnose_page, document, history_text, wording};
         --muscle c.toml c/*.csv\n  \
     host diagnose today/*.csv --reference march/*.csv --report changed.html\n  \
     host diagnose --muscle mini.toml today/*.csv --reference mini.pam")]
+#[command(mut_arg("import", stock::several_imports))]
 pub struct Arguments {
     #[command(flatten)]
     muscles: stock::Muscles,
@@ -102,6 +103,7 @@ impl Arguments {
         if self.muscles.several() {
             return stock::run(&self, console, taken);
         }
+        self.muscles.one_import()?;
         if !self.changed.reference.is_empty() {
             return reference::run(&self, console, taken);
         }

@@ -23,16 +23,29 @@ use pam_report::{stock_page, stock_text};
 pub struct Muscles {
     /// Descriptions, each with its place on the command line.
     described: Vec<(usize, PathBuf)>,
+    /// Import descriptions, each with its place.
+    imports: Vec<(usize, PathBuf)>,
     /// Places of the recordings.
     files: Vec<usize>,
 }
 
+/// A muscle with its recordings.
+struct Group<'a> {
+    muscle: &'a Path,
+    import: Option<&'a Path>,
+    files: Vec<PathBuf>,
+}
+
 impl FromArgMatches for Muscles {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
-        let places = |name: &str| matches.indices_of(name).map(Iterator::collect).unwrap_or_default();
-        let paths = matches.get_many::<PathBuf>("muscle").into_iter().flatten().cloned();
-        let at: Vec<usize> = places("muscle");
-        Ok(Self { described: at.into_iter().zip(paths).collect(), files: places("files") })
+        let places = |name: &str| -> Vec<usize> {
+            matches.indices_of(name).map(Iterator::collect).unwrap_or_default()
+        };
+        let placed = |name: &str| {
+            let paths = matches.get_many::<PathBuf>(name).into_iter().flatten().cloned();
+            places(name).into_iter().zip(paths).collect()
+        };
+        Ok(Self { described: placed("muscle"), imports: placed("import"), files: places("files") })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
@@ -62,6 +75,14 @@ impl Args for Muscles {
     }
 }
 
+/// The option `--import`, which may be given for each muscle.
+pub(super) fn several_imports(import: Arg) -> Arg {
+    import.action(ArgAction::Append).help(
+        "How to read files that are not in the usual form: an import description. With several muscles, one import description is for all \
+         of them; of several, each is for the muscle that it follows, and one before the first muscle for the others",
+    )
+}
+
 impl Muscles {
     /// The description of the only muscle, or of the first.
     pub(super) fn first(&self) -> Option<&Path> {
@@ -73,34 +94,71 @@ impl Muscles {
         self.described.len() > 1
     }
 
-    /// The recordings of each muscle: those between its description and the next one. `shared`: recordings behind the last description hold
-    /// all muscles, and the import description selects the rows of each.
+    /// The recordings of each muscle: those between its description and the next one. Where recordings are behind the last description only,
+    /// they hold all muscles, and an import description selects the rows of each.
     ///
     /// # Errors
-    /// [`DataCode::CallInvalid`] for recordings before the first description, and for a muscle without recordings.
-    fn groups(&self, files: &[PathBuf], shared: bool) -> Result<Vec<(&Path, Vec<PathBuf>)>> {
-        let mut groups: Vec<(&Path, Vec<PathBuf>)> =
-            self.described.iter().map(|(_, path)| (path.as_path(), Vec::new())).collect();
+    /// [`DataCode::CallInvalid`] for recordings before the first description, for a muscle without recordings, and for one with two import
+    /// descriptions.
+    fn groups(&self, files: &[PathBuf]) -> Result<Vec<Group<'_>>> {
+        let mut groups = Vec::new();
+        for (m, (_, muscle)) in self.described.iter().enumerate() {
+            groups.push(Group { muscle, import: self.import(m)?, files: Vec::new() });
+        }
         for (place, file) in self.files.iter().zip(files) {
-            let muscle = self.described.iter().rposition(|(at, _)| at < place).ok_or_else(|| {
+            let muscle = self.before(*place).ok_or_else(|| {
                 Error::new(DataCode::CallInvalid, "a recording stands before the first --muscle")
                     .file(file)
                     .help("put the recordings of each muscle behind its --muscle")
             })?;
-            groups[muscle].1.push(file.clone());
+            groups[muscle].files.push(file.clone());
         }
         let last = groups.len() - 1;
-        if shared && groups[..last].iter().all(|(_, files)| files.is_empty()) {
-            let all = groups[last].1.clone();
-            groups.iter_mut().for_each(|(_, files)| files.clone_from(&all));
+        if !self.imports.is_empty() && groups[..last].iter().all(|g| g.files.is_empty()) {
+            let all = groups[last].files.clone();
+            groups.iter_mut().for_each(|g| g.files.clone_from(&all));
         }
-        match groups.iter().find(|(_, files)| files.is_empty()) {
-            Some((path, _)) => Err(Error::new(DataCode::CallInvalid, "no recording follows this --muscle")
-                .file(path)
+        match groups.iter().find(|g| g.files.is_empty()) {
+            Some(g) => Err(Error::new(DataCode::CallInvalid, "no recording follows this --muscle")
+                .file(g.muscle)
                 .help("put the recordings of each muscle behind its --muscle")),
             None => Ok(groups),
         }
     }
+
+    /// The muscle whose description is the last before a place on the command line.
+    fn before(&self, place: usize) -> Option<usize> {
+        self.described.iter().rposition(|(at, _)| *at < place)
+    }
+
+    /// The import description of a muscle: the only one of the call, that behind its description, or that before all descriptions.
+    fn import(&self, muscle: usize) -> Result<Option<&Path>> {
+        let of = |owner: Option<usize>| -> Result<Option<&Path>> {
+            let mut own = self.imports.iter().filter(|(place, _)| self.before(*place) == owner);
+            match (own.next(), own.next()) {
+                (_, Some((_, second))) => Err(two_imports(second)),
+                (first, None) => Ok(first.map(|(_, path)| path.as_path())),
+            }
+        };
+        match self.imports.as_slice() {
+            [(_, only)] => Ok(Some(only)),
+            _ => Ok(of(Some(muscle))?.or(of(None)?)),
+        }
+    }
+
+    /// Refuses several import descriptions for a single muscle.
+    ///
+    /// # Errors
+    /// [`DataCode::CallInvalid`].
+    pub(super) fn one_import(&self) -> Result<()> {
+        self.imports.get(1).map_or(Ok(()), |(_, second)| Err(two_imports(second)))
+    }
+}
+
+fn two_imports(second: &Path) -> Error {
+    Error::new(DataCode::CallInvalid, "a second import description for the recordings of one muscle")
+        .file(second)
+        .help("give one --import for each --muscle, or one for all")
 }
 
 /// Refuses options that belong to a single muscle.
@@ -129,13 +187,13 @@ fn check(arguments: &Arguments) -> Result<()> {
 pub(super) fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> {
     check(arguments)?;
     let recordings = &arguments.recordings;
-    let groups = arguments.muscles.groups(&recordings.files, recordings.import.is_some())?;
+    let groups = arguments.muscles.groups(&recordings.files)?;
     let watched = if arguments.json.is_some() { Console::silent() } else { console.clone() };
     let mut read: Vec<(MuscleDescription, Campaign)> = Vec::new();
     let mut from = reports::provenance();
-    for (path, files) in groups {
-        let muscle = MuscleDescription::read(path)?;
-        let own = Recordings { files, ..recordings.clone() };
+    for Group { muscle, import, files } in groups {
+        let muscle = MuscleDescription::read(muscle)?;
+        let own = Recordings { files, import: import.map(Path::to_path_buf), ..recordings.clone() };
         let (campaign, hashes) = own.read_hashed(Reader::of(&muscle), &watched)?;
         for warning in &campaign.warnings {
             console.warning(format!("{}: {warning}", muscle.name));
@@ -165,25 +223,45 @@ mod tests {
         Arguments::of(words.split(' ').map(Into::into).collect()).expect("a valid call")
     }
 
-    fn groups(words: &str, shared: bool) -> Result<Vec<(String, usize)>> {
+    type Grouped = Vec<(String, Option<String>, usize)>;
+
+    fn groups(words: &str) -> Result<Grouped> {
         let arguments = parsed(words);
-        let groups = arguments.muscles.groups(&arguments.recordings.files, shared)?;
-        Ok(groups.into_iter().map(|(m, f)| (m.display().to_string(), f.len())).collect())
+        let groups = arguments.muscles.groups(&arguments.recordings.files)?;
+        let text = |path: &Path| path.display().to_string();
+        Ok(groups.into_iter().map(|g| (text(g.muscle), g.import.map(text), g.files.len())).collect())
+    }
+
+    fn expected<const N: usize>(groups: [(&str, Option<&str>, usize); N]) -> Grouped {
+        groups.map(|(m, i, f)| (m.to_owned(), i.map(str::to_owned), f)).to_vec()
     }
 
     #[test]
     fn recordings_belong_to_the_muscle_before_them() {
         let call = "diagnose --muscle a.toml 1.csv 2.csv --json x --muscle b.toml 3.csv --muscle c.toml 4.csv 5.csv 6.csv";
-        let expected = [("a.toml", 2), ("b.toml", 1), ("c.toml", 3)].map(|(m, n)| (m.to_owned(), n));
-        assert_eq!(groups(call, false).expect("groups"), expected);
+        let all = [("a.toml", None, 2), ("b.toml", None, 1), ("c.toml", None, 3)];
+        assert_eq!(groups(call).expect("groups"), expected(all));
+    }
+
+    #[test]
+    fn one_import_is_for_all_muscles_and_several_are_for_those_that_they_follow() {
+        let only = groups("diagnose --muscle a 1.csv --import x --muscle b 2.csv").expect("groups");
+        assert_eq!(only, expected([("a", Some("x"), 1), ("b", Some("x"), 1)]));
+        let call = "diagnose --import x --muscle a 1.csv --muscle b --import y 2.csv 3.csv --muscle c 4.csv";
+        let of_each = [("a", Some("x"), 1), ("b", Some("y"), 2), ("c", Some("x"), 1)];
+        assert_eq!(groups(call).expect("groups"), expected(of_each));
+        let two = groups("diagnose --muscle a 1.csv --muscle b --import x --import y 2.csv");
+        assert!(two.is_err_and(|e| e.to_string().contains("second import description")));
+        assert!(parsed("diagnose --muscle a 1.csv --import x --import y").muscles.one_import().is_err());
     }
 
     #[test]
     fn a_muscle_without_recordings_is_refused_unless_one_file_holds_all() {
         let call = "diagnose --muscle a.toml --muscle b.toml 1.csv";
-        assert!(groups(call, false).is_err());
-        assert_eq!(groups(call, true).expect("groups").iter().map(|g| g.1).collect::<Vec<_>>(), [1, 1]);
-        assert!(groups("diagnose 1.csv --muscle a.toml --muscle b.toml 2.csv", false).is_err());
+        assert!(groups(call).is_err());
+        let all = groups(&format!("{call} --import x")).expect("groups");
+        assert_eq!(all, expected([("a.toml", Some("x"), 1), ("b.toml", Some("x"), 1)]));
+        assert!(groups("diagnose 1.csv --muscle a.toml --muscle b.toml 2.csv").is_err());
     }
 
     #[test]
