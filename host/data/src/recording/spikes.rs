@@ -1,11 +1,17 @@
-//! Spikes: a reading that steps away and back within a few rows.
+//! Spikes: a reading that steps away and back within a few rows, farther than it changes over the rows beside.
 
 use std::ops::Range;
+
+use crate::statistics::median;
 
 /// What lasts as many rows is no spike.
 pub(super) const LONGEST: usize = 4;
 /// The row after differs from the row before by less than this share of the step, beyond what was to be expected.
 pub(super) const BACK: f64 = 0.25;
+/// A step is this many times as large as the changes beside it.
+pub(super) const SUDDEN: f64 = 2.0;
+/// This many changes on either side of a spike count. A turn of a fast stroke steps no farther than the rows beside.
+const BESIDE: usize = 4;
 
 /// The row that ends a spike which begins at `start`; `step` is the least change from row to row.
 pub(super) fn end_of_spike(column: &[f64], start: usize, step: f64) -> Option<usize> {
@@ -15,9 +21,18 @@ pub(super) fn end_of_spike(column: &[f64], start: usize, step: f64) -> Option<us
     }
     let (before, size) = (column[start - 1], change(start));
     let last = (start + LONGEST).min(column.len());
-    (start + 1..last).find(|i| {
+    let end = (start + 1..last).find(|i| {
         change(*i).abs() > step && change(*i) * size < 0.0 && (column[*i] - before).abs() <= BACK * size.abs()
-    })
+    })?;
+    (size.abs() > SUDDEN * usual_change(column, start..end)).then_some(end)
+}
+
+/// The median change from row to row beside some rows.
+pub(super) fn usual_change(column: &[f64], rows: Range<usize>) -> f64 {
+    let earlier = rows.start.saturating_sub(BESIDE).max(1)..rows.start;
+    let later = rows.end + 1..(rows.end + 1 + BESIDE).min(column.len());
+    let mut changes: Vec<f64> = earlier.chain(later).map(|i| (column[i] - column[i - 1]).abs()).collect();
+    if changes.is_empty() { 0.0 } else { median(&mut changes) }
 }
 
 /// All spikes of a column, in order.
@@ -45,5 +60,13 @@ mod tests {
         let column = [1.0, 9.0, 1.0, 1.0, 9.0, 9.0, 9.0, 1.1, 1.0, 9.0, 9.0, 9.0, 9.0, 1.0, 1.0];
         assert_eq!(spikes(&column, 2.0), [1..2, 4..7]);
         assert_eq!(spikes(&[], 1.0), []);
+    }
+
+    #[test]
+    fn the_turn_of_a_fast_stroke_is_no_spike() {
+        let triangle: Vec<f64> = (0..60).map(|i| f64::from((i % 20 - 10_i32).abs())).collect();
+        assert_eq!(spikes(&triangle, 0.5), []);
+        let few_readings: Vec<f64> = (0..60).map(|i| (f64::from(i) * 0.8).sin()).collect();
+        assert_eq!(spikes(&few_readings, 0.1), []);
     }
 }

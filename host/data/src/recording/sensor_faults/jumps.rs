@@ -3,12 +3,13 @@
 //! by the same, and single zeros of the force; its other spikes are outliers of a fit.
 //!
 //! A muscle at rest between two strokes is no drop-out of the force: near its full length a small stroke changes the force much. Its
-//! force comes and goes as fast as in the rows beside, or with a stroke or pressure that steps away and back, too.
+//! force comes and goes as fast as in the rows beside, or with a stroke or pressure that steps away and back, too. Nor is friction one that
+//! turns with the stroke at both ends, or the turn of a fast stroke a drop-out of the stroke.
 
 use std::ops::Range;
 
 use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
-use crate::recording::spikes::{self, end_of_spike};
+use crate::recording::spikes::{self, SUDDEN, end_of_spike, usual_change};
 use crate::recording::white_noise;
 
 /// A step is at least this share of the column's range, and this many standard deviations of a reading.
@@ -17,10 +18,10 @@ const STEP: (f64, f64) = (0.06, 12.0);
 const STEADY: f64 = 0.25;
 /// The other columns change by less than this share of their range over the row of a step.
 const OTHERS: f64 = 0.05;
-/// A force steps this many times as far as it changes over the row before and the row after.
-const SUDDEN: f64 = 2.0;
 /// A stroke or pressure rests between two steps where each of them is this many times its largest change over a row between.
 const RESTS: f64 = 3.0;
+/// A motion is what exceeds this many standard deviations of a reading of the stroke, over as many rows.
+const MOTION: (f64, usize) = (6.0, 2);
 /// What lasts longer, s, is how the bench was driven.
 const LONGEST: f64 = 10.0;
 
@@ -83,11 +84,15 @@ fn drop_out(recording: usize, rows: Range<usize>, channel: Channel, value: f64) 
 fn is_away(r: &Recording, channel: Channel, rows: Range<usize>, usual: &Usual) -> bool {
     match channel {
         Channel::Pressure => is_unfelt(r, rows, usual),
-        Channel::Stroke => true,
+        Channel::Stroke => {
+            let (stroke, step) = (&r.stroke, (r.stroke[rows.start] - r.stroke[rows.start - 1]).abs());
+            step > SUDDEN * usual_change(stroke, rows)
+        }
         Channel::Force => {
             let (force, expected) = (channel.of(r), usual.expected.at(r, rows.start));
             (force[rows.start] - expected).abs() > (force[rows.start - 1] - expected).abs()
                 && is_sudden(force, &rows)
+                && !(turns(&r.stroke, rows.start) && turns(&r.stroke, rows.end))
                 && ![Channel::Pressure, Channel::Stroke].iter().any(|c| rests(c.of(r), &rows))
         }
     }
@@ -97,6 +102,17 @@ fn is_away(r: &Recording, channel: Channel, rows: Range<usize>, usual: &Usual) -
 fn is_sudden(force: &[f64], rows: &Range<usize>) -> bool {
     let change = |i: usize| if 0 < i && i < force.len() { (force[i] - force[i - 1]).abs() } else { 0.0 };
     change(rows.start) > SUDDEN * change(rows.start - 1) && change(rows.end) > SUDDEN * change(rows.end + 1)
+}
+
+/// Whether the muscle turns, stops or sets off by this row.
+fn turns(stroke: &[f64], row: usize) -> bool {
+    let (least, n) = (MOTION.0 * white_noise(stroke), MOTION.1);
+    let moved = |from: usize, to: usize| Some(stroke.get(to)? - stroke.get(from)?);
+    let direction = |by: f64| if by.abs() > least { by.signum() } else { 0.0 };
+    (row.saturating_sub(n)..=row + 1).any(|k| {
+        let (before, after) = (k.checked_sub(n).and_then(|from| moved(from, k)), moved(k, k + n));
+        before.zip(after).is_some_and(|(b, a)| direction(b) != direction(a) && (b - a).abs() > least)
+    })
 }
 
 /// Whether a column steps away before these rows, rests in them, and steps back after them.

@@ -151,6 +151,45 @@ fn a_short_rest_at_full_length_is_no_drop_out_of_the_force() {
     }
 }
 
+/// Fast loops of a large dry friction: a stroke of few readings turns, and so does the friction. A stroke that is away for some of the
+/// rows of a loop, and a force that is away while the muscle moves on, are still found.
+#[test]
+fn turns_of_fast_strokes_are_no_drop_outs() {
+    let rows = 400;
+    let noise = |i: usize| (i * 7919 % 13) as f64 / 13.0 - 0.5;
+    let travel = |i: usize, period: usize| {
+        let k = i % period;
+        k.min(period - k) as f64 / (period / 2) as f64
+    };
+    // Large loops in 18 rows, then small ones in 14 rows.
+    let stroke = |i: usize| if i < 200 { 3e-3 * travel(i, 18) } else { 1e-3 + 0.5e-3 * travel(i - 200, 14) };
+    let pull = |i: usize| {
+        let shortens = i == 0 || stroke(i) >= stroke(i - 1);
+        let (contraction, friction) = (stroke(i) / 0.039, if shortens { 0.7 } else { 1.3 });
+        friction * ((345e3 - 70e3) * 2.9e-4 * (1.0 - 5.0 * contraction) - 150.0 * contraction)
+            + 0.1 * noise(i)
+    };
+    for seed in 0..10 {
+        let mut campaign = campaign(seed);
+        campaign.recordings.push(Recording {
+            name: "fast".into(),
+            time: (0..rows).map(|i| 0.1 * i as f64).collect(),
+            force: Some((0..rows).map(pull).collect()),
+            pressure: (0..rows).map(|i| 345e3 + 300.0 * noise(i)).collect(),
+            stroke: (0..rows).map(|i| stroke(i) + 1e-6 * noise(i + 5)).collect(),
+            ..Recording::default()
+        });
+        assert_eq!(faults(&campaign), [], "seed {seed}");
+        campaign.recordings[6].stroke[130..133].fill(20e-3);
+        let found = faults(&campaign);
+        assert_eq!(
+            found.iter().map(|f| (f.rows.clone(), f.channel)).collect::<Vec<_>>(),
+            [(130..133, Channel::Stroke)],
+            "seed {seed}"
+        );
+    }
+}
+
 #[test]
 fn a_force_that_is_cut_in_one_file_is_found() {
     let found = faults(&spoiled(3, Channel::Force, |c| c.iter_mut().for_each(|f| *f = f.min(40.0))));
