@@ -138,36 +138,54 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
     Some((slow + fast).sqrt())
 }
 
-/// The sum of the autocorrelation of a residual, in s, from lagged products within recordings.
-pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 {
-    let n = rows.len();
-    let variance = energy(residual) / rows.effective().max(1) as f64;
-    if !(variance > 0.0) {
-        return step;
+/// The autocorrelation of a series at a lag, from products within recordings; 0 where no rows are that far apart.
+fn autocorrelation(rows: &Rows, series: &[f64], lag: usize) -> f64 {
+    let variance = energy(series) / rows.effective().max(1) as f64;
+    let (mut product, mut count) = (0.0, 0.0);
+    for i in lag..rows.len() {
+        if rows.recording[i] == rows.recording[i - lag]
+            && rows.root_weight()[i] > 0.0
+            && rows.root_weight()[i - lag] > 0.0
+        {
+            product += series[i] * series[i - lag];
+            count += 1.0;
+        }
     }
+    if count > 0.0 && variance > 0.0 { product / count / variance } else { 0.0 }
+}
+
+/// The sum of the autocorrelation of a residual, in s; at each lag times that of a trace, where one is given.
+fn correlation_sum(rows: &Rows, residual: &[f64], trace: Option<&[f64]>, step: f64) -> f64 {
     let mut sum = 0.5;
     let mut lag = 1_usize;
     let mut last = 0_usize;
-    while lag < n / LONGEST_LAG {
-        let (mut product, mut count) = (0.0, 0.0);
-        for i in lag..n {
-            if rows.recording[i] == rows.recording[i - lag]
-                && rows.root_weight()[i] > 0.0
-                && rows.root_weight()[i - lag] > 0.0
-            {
-                product += residual[i] * residual[i - lag];
-                count += 1.0;
-            }
-        }
-        let r = if count > 0.0 { product / count / variance } else { 0.0 };
+    while lag < rows.len() / LONGEST_LAG {
+        let r = autocorrelation(rows, residual, lag);
         if r < CORRELATION_END {
             break;
         }
-        sum += r * (lag - last) as f64;
+        sum += r * trace.map_or(1.0, |t| autocorrelation(rows, t, lag)) * (lag - last) as f64;
         last = lag;
         lag = (lag as f64 * LAG_GROWTH).ceil() as usize;
     }
     2.0 * sum * step
+}
+
+/// The correlation time of a residual, s.
+pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 {
+    correlation_sum(rows, residual, None, step)
+}
+
+/// How many independent rows the amplitude of a trace is estimated from, beside a residual of these autocorrelations. A slow residual says little
+/// about a slow trace, and much about one that changes its sign with every stroke. Not fewer than the residual alone has.
+///
+/// M. S. Bartlett, J. Royal Statistical Society 98 (1935) 536–543: the variance of a correlation grows with the sum of the products of both
+/// autocorrelations.
+pub(crate) fn independent_beside(rows: &Rows, residual: &[f64], trace: &[f64], step: f64) -> f64 {
+    let effective = rows.effective().max(1) as f64;
+    let alone = correlation_time(rows, residual, step);
+    let memory = correlation_sum(rows, residual, Some(trace), step).clamp(step.min(alone), alone);
+    (effective * step / memory).clamp(2.0, effective)
 }
 
 /// Estimates the noise from the weighted residual of the most flexible model.
@@ -230,6 +248,29 @@ pub(crate) fn family_p(scores: &[&[f64]], throws: usize, seed: u64) -> Vec<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rows::{prepare, typical_step};
+    use crate::tests::{geometry, loops, recorded};
+
+    /// A residual that drifts slowly through each recording: friction, which changes its sign with every stroke, is estimated beside it
+    /// from many rows, a drift from as few as the residual itself.
+    #[test]
+    fn a_slow_residual_says_little_about_slow_traces_only() {
+        let campaign = recorded(loops(&[0.2]), 4, |_, _| 0.0, |_, _, _| 0.0);
+        let (rows, _) = prepare(&campaign, &geometry().build().expect("a braid")).expect("rows");
+        let step = typical_step(&rows);
+        let middle =
+            |i: usize| rows.recording.iter().filter(|r| **r == rows.recording[i]).count() as f64 / 2.0;
+        let first = |i: usize| rows.recording.iter().position(|r| *r == rows.recording[i]).unwrap_or(0);
+        let slow: Vec<f64> = (0..rows.len())
+            .map(|i| rows.root_weight()[i] * ((i - first(i)) as f64 / middle(i) - 1.0))
+            .collect();
+        let friction: Vec<f64> = rows.root_weight().iter().zip(&rows.sign).map(|(w, s)| w * s).collect();
+        let alone = rows.effective() as f64 * step / correlation_time(&rows, &slow, step);
+        let of_slow = independent_beside(&rows, &slow, &slow, step);
+        let of_friction = independent_beside(&rows, &slow, &friction, step);
+        assert!(of_slow < 3.0 * alone, "{of_slow} {alone}");
+        assert!(of_friction > 4.0 * of_slow, "{of_friction} {of_slow}");
+    }
 
     #[test]
     fn the_family_is_controlled_and_a_real_one_is_found() {
