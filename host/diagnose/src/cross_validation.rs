@@ -1,7 +1,6 @@
 //! The improvement on held-out rows: whole pressures, recordings, cycles or stretches of time, never random
 //! rows of the same stroke.
 
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
@@ -66,35 +65,7 @@ fn claimed(rows: &Rows) -> Vec<bool> {
         .collect()
 }
 
-/// The ranges of strokes of the fitted rows. Beyond them a polynomial extrapolates. A baseline with a polynomial at each pressure at which the
-/// muscle was worked has a range at each: a pressure that was worked only in the rows left out has none.
-struct Reach {
-    by_level: BTreeMap<u32, RangeInclusive<f64>>,
-    one_for_all: bool,
-}
-
-impl Reach {
-    fn of(rows: &Rows, kind: Kind) -> Self {
-        let one_for_all = kind.reaches_over_pressures() || !rows.steady;
-        let mut by_level: BTreeMap<u32, RangeInclusive<f64>> = BTreeMap::new();
-        for (i, context) in rows.contexts().iter().enumerate().filter(|(i, _)| rows.root_weight()[*i] > 0.0) {
-            let stroke = context.stroke;
-            let level = if one_for_all { 0 } else { rows.level[i] };
-            by_level
-                .entry(level)
-                .and_modify(|r| *r = r.start().min(stroke)..=r.end().max(stroke))
-                .or_insert(stroke..=stroke);
-        }
-        Self { by_level, one_for_all }
-    }
-
-    fn contains(&self, level: u32, stroke: f64) -> bool {
-        let level = if self.one_for_all { 0 } else { level };
-        self.by_level.get(&level).is_some_and(|r| r.contains(&stroke))
-    }
-}
-
-/// The range of strokes of the fitted rows.
+/// The range of strokes of the fitted rows. Beyond it a polynomial extrapolates.
 fn strokes(rows: &Rows) -> RangeInclusive<f64> {
     let fitted =
         || rows.contexts().iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.stroke);
@@ -129,12 +100,12 @@ fn left_out(rows: &Rows, kind: Kind, traces: &[Vec<f64>], split: &Groups, tares:
         .map(|g| {
             rows.progress().step();
             let blind = rows.without(|i| split.group[i] == *g);
-            let reach = Reach::of(&blind, kind);
+            let reach = strokes(&blind);
             let fitted = baselines::fit(&blind, kind, traces);
             let mut squares = vec![Squares::default(); count];
             for i in 0..rows.len() {
                 // The place where friction rests was fitted there and cannot be predicted.
-                let within = rows.vented[i] || reach.contains(rows.level[i], rows.contexts()[i].stroke);
+                let within = reach.contains(&rows.contexts()[i].stroke);
                 let judged =
                     if rows.vented[i] { tares } else { rows.sign[i] != 0.0 && rows.at_rest().rest[i] == 0 };
                 let square = fitted.raw_residual[i].powi(2);

@@ -13,8 +13,7 @@ use super::criteria::candidates::LEAST_SIGMA;
 use super::criteria::selection::{
     ALIKE, ALONE_FLOOR, CONFUSABLE, EXCHANGE_LEAVES, FAMILY_ALPHA, FEWEST_INDEPENDENT, FIRST_STROKES,
     FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MOST_COMPETITORS,
-    MOST_EXCLUDED, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, PAIR_FIRST, PAIR_SHARE,
-    PAIRS_TRIED, SELECTION_FLOOR, SHADOW,
+    MOST_EXCLUDED, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
 };
 use super::likelihood::Scale;
 use super::linear::energy;
@@ -42,18 +41,7 @@ pub(crate) fn forward_selection(
     search.end()
 }
 
-/// The candidates at one step of the selection.
-struct Step {
-    /// The best fit of each.
-    best: Vec<CandidateFit>,
-    /// Family-wise p of each of these.
-    p: Vec<f64>,
-    /// Which of these is to be judged.
-    winner: Option<usize>,
-}
-
 /// A forward selection under way.
-#[derive(Clone)]
 struct ForwardSelection<'a> {
     /// The rows, linearised about the present baseline.
     rows: Rows,
@@ -132,83 +120,22 @@ impl<'a> ForwardSelection<'a> {
         (energy - self.noise.sigma.powi(2) * self.scale.weight).max(LEAST_EXCESS * energy).max(1e-12)
     }
 
-    /// One step: selects or excludes a candidate, selects two that only together explain enough, or ends the selection.
+    /// One step: selects or excludes a candidate, or ends the selection.
     fn next(&mut self) -> ControlFlow<()> {
-        let step = self.step();
-        let Some(at) = step.winner else { return ControlFlow::Break(()) };
-        if self.is_sufficient(&step.best[at], step.p[at]) {
-            return self.judge(at, &step);
-        }
-        match self.pair(&step) {
-            Some(with_both) => {
-                *self = with_both;
-                ControlFlow::Continue(())
-            }
-            None => ControlFlow::Break(()),
-        }
-    }
-
-    /// Every candidate beside the present baseline.
-    fn step(&mut self) -> Step {
         let scorer = Scorer::new(&self.joint, self.scale);
         let (best, p) = scan_step(self.library, &self.rows, &scorer, self.blocked, &self.chosen);
         if self.first_scan.is_none() {
             self.first_scan = Some((best.clone(), p.clone()));
         }
-        let winner = self.winner(&best, &scorer);
-        if let (true, Some(at)) = (self.chosen.is_empty(), winner) {
+        let Some(at) = self.winner(&best, &scorer) else { return ControlFlow::Break(()) };
+        if self.chosen.is_empty() {
             self.energy_before = best[at].before;
             self.excess_energy = self.excess_of(self.energy_before);
         }
-        Step { best, p, winner }
-    }
-
-    /// Two effects of which none explains enough alone, because the other is left, and which together explain what two steps of the selection
-    /// have to. The first is one of the best that are beyond chance; the second is selected beside it by the usual rules.
-    fn pair(&self, step: &Step) -> Option<Self> {
-        if self.chosen.len() + 2 > MOST_SELECTED {
-            return None;
+        if !self.is_sufficient(&best[at], p[at]) {
+            return ControlFlow::Break(());
         }
-        let scorer = Scorer::new(&self.joint, self.scale);
-        let could_be_first = |at: &usize| {
-            let t = &step.best[*at];
-            self.is_eligible(t, &scorer)
-                && self.is_significant(t, step.p[*at])
-                && self.of_rest(t) >= PAIR_FIRST * LEAST_SHARE
-        };
-        let mut firsts: Vec<usize> = (0..step.best.len()).filter(could_be_first).collect();
-        firsts.sort_by(|a, b| step.best[*b].score.total_cmp(&step.best[*a].score));
-        firsts.truncate(PAIRS_TRIED);
-        let before = energy(&self.joint.residual);
-        let enough = |both: &Self| self.excess_of(before) * (1.0 - PAIR_SHARE) >= both.excess_left();
-        firsts
-            .into_iter()
-            .filter_map(|first| {
-                let mut both = self.clone();
-                let chosen = both.chosen.len();
-                let _ = both.judge(first, step);
-                if both.chosen.len() != chosen + 1 {
-                    return None;
-                }
-                let step = both.step();
-                let second = step.winner.filter(|at| both.is_sufficient(&step.best[*at], step.p[*at]))?;
-                let _ = both.judge(second, &step);
-                (both.chosen.len() == chosen + 2).then_some(both)
-            })
-            .filter(enough)
-            .min_by(|a, b| energy(&a.joint.residual).total_cmp(&energy(&b.joint.residual)))
-    }
-
-    /// What the effects so far leave above the noise, N².
-    fn excess_left(&self) -> f64 {
-        (energy(&self.joint.residual) - self.noise.sigma.powi(2) * self.scale.weight).max(0.0)
-    }
-
-    /// Selects or excludes a candidate that explains enough, or ends the selection where too many others explain the same.
-    fn judge(&mut self, at: usize, step: &Step) -> ControlFlow<()> {
-        let Step { best, p, .. } = step;
-        let scorer = Scorer::new(&self.joint, self.scale);
-        let winner = self.best_within_known_range(&best[at], best, &scorer);
+        let winner = self.best_within_known_range(&best[at], &best, &scorer);
         if let Some(memory) = self.memory_of_unknown_start(&winner) {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
@@ -219,7 +146,7 @@ impl<'a> ForwardSelection<'a> {
         }
         let beside = Kind::Soft(winner.prior);
         let metric = baselines::fit(&self.rows, beside, &[]);
-        let competitors = competitors(&winner, best, self.library, &self.rows, &scorer, &metric.span);
+        let competitors = competitors(&winner, &best, self.library, &self.rows, &scorer, &metric.span);
         let open: Vec<String> = competitors
             .iter()
             .filter(|r| r.1 > CONFUSABLE)
@@ -302,17 +229,17 @@ impl<'a> ForwardSelection<'a> {
 
     /// Whether it is beyond chance, explains enough, and is large enough to matter.
     fn is_sufficient(&self, winner: &CandidateFit, p: f64) -> bool {
-        let further = self.chosen.is_empty() || winner.gain / self.excess_energy >= FURTHER_SHARE;
-        further && self.of_rest(winner) >= LEAST_SHARE && self.is_significant(winner, p)
-    }
-
-    /// Whether it is beyond chance, and large enough to matter.
-    fn is_significant(&self, winner: &CandidateFit, p: f64) -> bool {
         // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
         // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
         // correlation leaves.
         let by_blocks = p <= FAMILY_ALPHA;
         let significant = winner.score >= if by_blocks { LEAST_SCORE } else { LEAST_SCORE_ALONE };
+        let of_rest = self.of_rest(winner);
+        let worth = if self.chosen.is_empty() {
+            of_rest >= LEAST_SHARE
+        } else {
+            winner.gain / self.excess_energy >= FURTHER_SHARE && of_rest >= LEAST_SHARE
+        };
         // A wall at the end of the stroke is high and narrow.
         let narrow =
             winner.peak >= NARROW_PEAK * self.blocked && winner.score >= NARROW_SCORE * LEAST_SCORE_ALONE;
@@ -325,7 +252,7 @@ impl<'a> ForwardSelection<'a> {
             (true, false) => 1.0,
             (false, _) => ALONE_FLOOR,
         };
-        significant && moved >= least * SELECTION_FLOOR * self.blocked
+        significant && worth && moved >= least * SELECTION_FLOOR * self.blocked
     }
 
     /// Refits all effects jointly with it. It is selected if it keeps most of its gain; else it is excluded.

@@ -34,12 +34,6 @@ pam_data::criteria! {
     LEAST_SHARE: f64 = 0.4, "q_first", "1", Judgement;
     /// A further effect must also explain this share of all excess error: more than the first law leaves by its inexactness.
     FURTHER_SHARE: f64 = 0.03, "q_further", "1", Derived("17 % of the error; laws are off by 3 to 7 % of their traces");
-    /// Where no effect explains enough alone, the first of two explains this part of what one must.
-    PAIR_FIRST: f64 = 0.5, "q_pair,1/q_first", "1", Judgement;
-    /// ... and both together explain this share of the excess error.
-    PAIR_SHARE: f64 = 0.64, "q_pair", "1", Derived("two effects one after the other explain 1 − (1 − 0.4)² at least");
-    /// First effects that are tried.
-    PAIRS_TRIED: usize = 4, "n_pair", "1", Cost;
     /// Effects that are selected at most.
     MOST_SELECTED: usize = 5, "n_max", "1", Judgement;
     /// An effect is not selected where one that is concealed scores this many times as much.
