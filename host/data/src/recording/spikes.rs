@@ -10,7 +10,7 @@ pub(super) const LONGEST: usize = 4;
 pub(super) const BACK: f64 = 0.25;
 /// A step is this many times as large as the changes beside it.
 pub(super) const SUDDEN: f64 = 2.0;
-/// This many changes on either side of a spike count. A turn of a fast stroke steps no farther than the rows beside.
+/// This many changes on either side of a spike count. Where a fast stroke turns, it steps no farther than in the rows beside.
 const BESIDE: usize = 4;
 
 /// The row that ends a spike which begins at `start`; `step` is the least change from row to row.
