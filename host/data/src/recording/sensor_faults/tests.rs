@@ -152,7 +152,7 @@ fn a_short_rest_at_full_length_is_no_drop_out_of_the_force() {
 }
 
 /// Fast loops of a large dry friction: a stroke of few readings turns, and so does the friction. A stroke that is away for some of the
-/// rows of a loop, and a force that is away while the muscle moves on, are still found.
+/// rows of a loop is still found.
 #[test]
 fn turns_of_fast_strokes_are_no_drop_outs() {
     let rows = 400;
