@@ -267,7 +267,8 @@ impl<'a> ForwardSelection<'a> {
         // pressure to pressure shows itself only now.
         let left = noise::estimate(&joint.rows, &joint.base.residual, self.step);
         let trace = candidate_fit::projected_trace(&winner, self.library, &joint.rows, &metric.span);
-        let independent = noise::independent_beside(&joint.rows, &joint.base.residual, &trace, self.step)
+        let residual = &joint.base.residual;
+        let independent = noise::independent_beside(&joint.rows, residual, left.memory, &trace, self.step)
             .max(FEWEST_INDEPENDENT);
         let score = winner.score * (independent / self.scale.independent).min(1.0);
         let slow = self.library[winner.candidate].traits.slow;

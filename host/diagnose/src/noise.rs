@@ -176,14 +176,13 @@ pub(crate) fn correlation_time(rows: &Rows, residual: &[f64], step: f64) -> f64 
     correlation_sum(rows, residual, None, step)
 }
 
-/// How many independent rows the amplitude of a trace is estimated from, beside a residual of these autocorrelations. A slow residual says little
+/// How many independent rows the amplitude of a trace is estimated from, beside a residual of this correlation time `alone`, s. A slow residual says little
 /// about a slow trace, and much about one that changes its sign with every stroke. Not fewer than the residual alone has.
 ///
 /// M. S. Bartlett, J. Royal Statistical Society 98 (1935) 536–543: the variance of a correlation grows with the sum of the products of both
 /// autocorrelations.
-pub(crate) fn independent_beside(rows: &Rows, residual: &[f64], trace: &[f64], step: f64) -> f64 {
+pub(crate) fn independent_beside(rows: &Rows, residual: &[f64], alone: f64, trace: &[f64], step: f64) -> f64 {
     let effective = rows.effective().max(1) as f64;
-    let alone = correlation_time(rows, residual, step);
     let memory = correlation_sum(rows, residual, Some(trace), step).clamp(step.min(alone), alone);
     (effective * step / memory).clamp(2.0, effective)
 }
@@ -265,9 +264,10 @@ mod tests {
             .map(|i| rows.root_weight()[i] * ((i - first(i)) as f64 / middle(i) - 1.0))
             .collect();
         let friction: Vec<f64> = rows.root_weight().iter().zip(&rows.sign).map(|(w, s)| w * s).collect();
-        let alone = rows.effective() as f64 * step / correlation_time(&rows, &slow, step);
-        let of_slow = independent_beside(&rows, &slow, &slow, step);
-        let of_friction = independent_beside(&rows, &slow, &friction, step);
+        let memory = correlation_time(&rows, &slow, step);
+        let alone = rows.effective() as f64 * step / memory;
+        let of_slow = independent_beside(&rows, &slow, memory, &slow, step);
+        let of_friction = independent_beside(&rows, &slow, memory, &friction, step);
         assert!(of_slow < 3.0 * alone, "{of_slow} {alone}");
         assert!(of_friction > 4.0 * of_slow, "{of_friction} {of_slow}");
     }
