@@ -55,3 +55,4 @@ pub use mountings::{Preceding, Rest, SAME_LENGTH, VENTING};
 pub use noise::white_noise;
 pub use quantity::{Named, Quantity, Unit, named};
 pub use read::{Hashes, Reader};
+pub use spikes::usual_change;

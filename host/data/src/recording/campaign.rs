@@ -136,12 +136,10 @@ pub fn largest_force_of<'a>(recordings: impl Iterator<Item = &'a Recording> + Cl
 
 /// A warning about a recording whose clock pauses while the length changes: runs at different lengths in one file look like motion.
 fn joined_runs(recording: &Recording) -> Option<String> {
-    /// A pause lasts this many sample intervals and seconds; rows that a logger lost are fewer.
-    const PAUSE: (f64, f64) = (20.0, 2.0);
     /// The change of the stroke, as a share of its range: more than a held length yields in a pause.
     const CHANGE: f64 = 0.05;
     let (time, stroke) = (&recording.time, &recording.stroke);
-    let least = PAUSE.1.max(PAUSE.0 * typical_interval(time)?);
+    let least = least_pause(time)?;
     let pauses: Vec<usize> =
         (1..time.len().min(stroke.len())).filter(|i| time[*i] - time[i - 1] > least).collect();
     if pauses.is_empty() {
@@ -158,6 +156,13 @@ fn joined_runs(recording: &Recording) -> Option<String> {
         time[at - 1],
         1e3 * change(&at)
     ))
+}
+
+/// The shortest pause of a clock, s.
+pub(super) fn least_pause(time: &[f64]) -> Option<f64> {
+    /// A pause lasts this many sample intervals and seconds; rows that a logger lost are fewer.
+    const PAUSE: (f64, f64) = (20.0, 2.0);
+    Some(PAUSE.1.max(PAUSE.0 * typical_interval(time)?))
 }
 
 /// The median time between rows, s, of some rows at the beginning.

@@ -16,6 +16,7 @@
 mod constant_runs;
 mod dead_channels;
 mod jumps;
+mod stroke_motion;
 #[cfg(test)]
 mod tests;
 

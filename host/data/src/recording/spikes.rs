@@ -24,11 +24,18 @@ pub(super) fn end_of_spike(column: &[f64], start: usize, step: f64) -> Option<us
     let end = (start + 1..last).find(|i| {
         change(*i).abs() > step && change(*i) * size < 0.0 && (column[*i] - before).abs() <= BACK * size.abs()
     })?;
-    (size.abs() > SUDDEN * usual_change(column, start..end)).then_some(end)
+    // The apex of a fast stroke that sets off from rest is reached and left as fast.
+    let onward = |i: usize, way: f64| match column.get(i) {
+        Some(_) if i > 0 && change(i) * way > 0.0 => change(i).abs(),
+        _ => 0.0,
+    };
+    let beside = usual_change(column, start..end).max(onward(start - 1, size).min(onward(end + 1, -size)));
+    (size.abs() > SUDDEN * beside).then_some(end)
 }
 
-/// The median change from row to row beside some rows.
-pub(super) fn usual_change(column: &[f64], rows: Range<usize>) -> f64 {
+/// The median change from row to row beside some rows of a column, in its unit; zero where there are no others.
+#[must_use]
+pub fn usual_change(column: &[f64], rows: Range<usize>) -> f64 {
     let earlier = rows.start.saturating_sub(BESIDE).max(1)..rows.start;
     let later = rows.end + 1..(rows.end + 1 + BESIDE).min(column.len());
     let mut changes: Vec<f64> = earlier.chain(later).map(|i| (column[i] - column[i - 1]).abs()).collect();
@@ -68,5 +75,7 @@ mod tests {
         assert_eq!(spikes(&triangle, 0.5), []);
         let few_readings: Vec<f64> = (0..60).map(|i| (f64::from(i) * 0.8).sin()).collect();
         assert_eq!(spikes(&few_readings, 0.1), []);
+        let from_rest = [0.0, 0.0, 0.0, 0.0, 6.1, 12.1, 6.9, 2.8, 0.4, 0.0, 0.0, 0.0];
+        assert_eq!(spikes(&from_rest, 1.0), []);
     }
 }

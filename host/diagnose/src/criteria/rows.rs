@@ -10,6 +10,8 @@ pam_data::criteria! {
     SPIKE_NOISE: f64 = 9.0, "n_spike", "1", Derived("white noise exceeds 9 deviations never in a campaign");
     /// ... and by this share of the force's range.
     SPIKE_RANGE: f64 = 0.004, "F_spike/range", "1", Judgement;
+    /// ... and by this many times the median change from reading to reading beside it.
+    SPIKE_CHANGE: f64 = 3.0, "n_change", "1", Derived("where an even motion turns, the median of five is two changes away");
     /// Spikes are mentioned where they are more than one of this many readings.
     SPIKES_MENTIONED: usize = 200, "1/q_spike", "1", Judgement;
     /// Below this share of the largest force the muscle carries no load: a repeated reading is no end of the sensor's range, a row may be slack.

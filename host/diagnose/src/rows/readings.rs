@@ -1,11 +1,14 @@
 //! Readings of less weight: outliers, ends of the sensor's range, readings on steep flanks.
 
-use crate::criteria::rows::{FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY, SPIKE_NOISE, SPIKE_RANGE};
-use pam_data::recording::{Campaign, white_noise};
+use crate::criteria::rows::{
+    FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY, SPIKE_CHANGE, SPIKE_NOISE, SPIKE_RANGE,
+};
+use pam_data::recording::{Campaign, usual_change, white_noise};
 use pam_fit::numerics::median;
 use pam_fit::{Clip, clip};
 
-/// Isolated spikes of a series: rows that stand out from the middle of their five neighbours by more than noise can.
+/// Isolated spikes of a series: rows that stand out from the middle of their five neighbours by more than noise can, and by more than the
+/// series changes beside them. Where a fast stroke turns, the force has an extremum.
 pub(super) fn spikes(series: &[f64]) -> Vec<bool> {
     let n = series.len();
     let noise = white_noise(series);
@@ -18,7 +21,8 @@ pub(super) fn spikes(series: &[f64]) -> Vec<bool> {
             }
             let mut five = [series[i - 2], series[i - 1], series[i], series[i + 1], series[i + 2]];
             five.sort_unstable_by(f64::total_cmp);
-            (series[i] - five[2]).abs() > limit
+            let off = (series[i] - five[2]).abs();
+            off > limit && off > SPIKE_CHANGE * usual_change(series, i..i + 1)
         })
         .collect()
 }
@@ -51,4 +55,26 @@ pub(super) fn blurred(force: &[f64], mut weights: Vec<f64>, block: &[u32], recor
         from = i;
     }
     weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The force of a fast stroke, which friction turns with, and the same with three spikes.
+    #[test]
+    fn the_extremum_of_a_fast_stroke_is_no_spike() {
+        let noise = |i: usize| ((i * 7919 % 13) as f64 / 13.0 - 0.5) * 0.2;
+        let triangle = |i: usize| (i % 16).abs_diff(8) as f64;
+        let shortens = |i: usize| if i % 16 < 8 { 0.9 } else { 1.1 };
+        let force: Vec<f64> =
+            (0..320).map(|i| shortens(i) * (100.0 + 8.0 * triangle(i)) + noise(i)).collect();
+        assert!(!spikes(&force).contains(&true));
+        let mut spoiled = force;
+        for i in [45, 120, 248] {
+            spoiled[i] += 90.0;
+        }
+        let found: Vec<usize> = (0..320).filter(|i| spikes(&spoiled)[*i]).collect();
+        assert_eq!(found, [45, 120, 248]);
+    }
 }

@@ -4,11 +4,14 @@
 //!
 //! A muscle at rest between two strokes is no drop-out of the force: near its full length a small stroke changes the force much. Its
 //! force comes and goes as fast as in the rows beside, or with a stroke or pressure that steps away and back, too. Nor is friction one that
-//! turns with the stroke at both ends, or the turn of a fast stroke a drop-out of the stroke.
+//! turns with the stroke at both ends, or the turn of a fast stroke a drop-out of the stroke. A step over a pause of the clock is none.
 
+use std::cell::LazyCell;
 use std::ops::Range;
 
+use super::stroke_motion::StrokeMotion;
 use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
+use crate::recording::campaign::least_pause;
 use crate::recording::spikes::{self, SUDDEN, end_of_spike, usual_change};
 use crate::recording::white_noise;
 
@@ -20,8 +23,6 @@ const STEADY: f64 = 0.25;
 const OTHERS: f64 = 0.05;
 /// A stroke or pressure rests between two steps where each of them is this many times its largest change over a row between.
 const RESTS: f64 = 3.0;
-/// A motion is what exceeds this many standard deviations of a reading of the stroke, over as many rows.
-const MOTION: (f64, usize) = (6.0, 2);
 /// What lasts longer, s, is how the bench was driven.
 const LONGEST: f64 = 10.0;
 
@@ -45,7 +46,10 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     let others: Vec<(&[f64], f64)> = others.map(|c| (c.of(r), OTHERS * usual.spans[c as usize])).collect();
     // At constant pressure or length a column has no range, and its changes are noise.
     let quiet = |i: usize| others.iter().all(|(c, most)| *most <= 0.0 || (c[i] - c[i - 1]).abs() <= *most);
-    let edge = |i: usize| (column[i] - column[i - 1]).abs() > step;
+    // Over a pause the reading has time to go elsewhere.
+    let pause = least_pause(&r.time).unwrap_or(f64::INFINITY);
+    let edge = |i: usize| (column[i] - column[i - 1]).abs() > step && r.time[i] - r.time[i - 1] <= pause;
+    let motion = LazyCell::new(|| StrokeMotion::of(&r.stroke));
     let mut found = Vec::new();
     let mut i = 1;
     while i < column.len() {
@@ -65,7 +69,7 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
         }
         let end = if edge(i) && quiet(i) { end_of(r, column, i, edge) } else { None };
         match end.filter(|end| quiet(*end) && returns(r, channel, column, i..*end, usual)) {
-            Some(end) if is_away(r, channel, i..end, usual) => {
+            Some(end) if is_away(r, channel, i..end, usual, &motion) => {
                 found.push(drop_out(index, i..end, channel, column[i]));
                 i = end + 1;
             }
@@ -81,7 +85,13 @@ fn drop_out(recording: usize, rows: Range<usize>, channel: Channel, value: f64) 
 
 /// Whether the reading is wrong in these rows, and not beside them: the pressure is unfelt there, or the force is farther from what is
 /// expected than the reading before.
-fn is_away(r: &Recording, channel: Channel, rows: Range<usize>, usual: &Usual) -> bool {
+fn is_away(
+    r: &Recording,
+    channel: Channel,
+    rows: Range<usize>,
+    usual: &Usual,
+    motion: &StrokeMotion<'_>,
+) -> bool {
     match channel {
         Channel::Pressure => is_unfelt(r, rows, usual),
         Channel::Stroke => {
@@ -92,7 +102,7 @@ fn is_away(r: &Recording, channel: Channel, rows: Range<usize>, usual: &Usual) -
             let (force, expected) = (channel.of(r), usual.expected.at(r, rows.start));
             (force[rows.start] - expected).abs() > (force[rows.start - 1] - expected).abs()
                 && is_sudden(force, &rows)
-                && !(turns(&r.stroke, rows.start) && turns(&r.stroke, rows.end))
+                && !turns_with_friction(force, motion, &rows, usual)
                 && ![Channel::Pressure, Channel::Stroke].iter().any(|c| rests(c.of(r), &rows))
         }
     }
@@ -104,15 +114,13 @@ fn is_sudden(force: &[f64], rows: &Range<usize>) -> bool {
     change(rows.start) > SUDDEN * change(rows.start - 1) && change(rows.end) > SUDDEN * change(rows.end + 1)
 }
 
-/// Whether the muscle turns, stops or sets off by this row.
-fn turns(stroke: &[f64], row: usize) -> bool {
-    let (least, n) = (MOTION.0 * white_noise(stroke), MOTION.1);
-    let moved = |from: usize, to: usize| Some(stroke.get(to)? - stroke.get(from)?);
-    let direction = |by: f64| if by.abs() > least { by.signum() } else { 0.0 };
-    (row.saturating_sub(n)..=row + 1).any(|k| {
-        let (before, after) = (k.checked_sub(n).and_then(|from| moved(from, k)), moved(k, k + n));
-        before.zip(after).is_some_and(|(b, a)| direction(b) != direction(a) && (b - a).abs() > least)
-    })
+/// Whether friction explains that the force steps away and back: the muscle turns, stops or sets off at both ends. Where a slow turn hides in
+/// the noise of the stroke, the muscle is slow there, and the force steps no farther than friction usually makes it.
+fn turns_with_friction(force: &[f64], motion: &StrokeMotion<'_>, rows: &Range<usize>, usual: &Usual) -> bool {
+    let step = (force[rows.start] - force[rows.start - 1]).abs();
+    let ends = [rows.start, rows.end];
+    ends.iter().all(|end| motion.turns(*end, rows.len()))
+        || step <= usual.noticeable(0.0) && ends.iter().all(|end| motion.is_slow(*end))
 }
 
 /// Whether a column steps away before these rows, rests in them, and steps back after them.

@@ -190,6 +190,45 @@ fn turns_of_fast_strokes_are_no_drop_outs() {
     }
 }
 
+/// Slow strokes with small returns: between two reversals friction raises the force for seconds. And runs in one file: while the clock
+/// pauses the friction of the run before fades, until the next stroke begins. A drop-out of the force is still found.
+#[test]
+fn returns_of_slow_strokes_and_pauses_of_the_clock_are_no_drop_outs() {
+    let rows = 2400;
+    let noise = |i: usize| (43_758.5 * (12.9898 * i as f64).sin()).rem_euclid(1.0) - 0.5;
+    let wave = |i: usize| {
+        let t = i as f64 / rows as f64 * 4.0 * std::f64::consts::TAU;
+        0.5e-3 * (1.0 - t.cos()) + 0.06e-3 * (5.0 * t).sin()
+    };
+    let still = |i: usize| (1200..1240).contains(&i);
+    let stroke = |i: usize| if still(i) { 0.0 } else { wave(i) };
+    let pull = |i: usize| {
+        let friction = if still(i) {
+            1.12
+        } else if i == 0 || stroke(i) >= stroke(i - 1) {
+            0.9
+        } else {
+            1.1
+        };
+        friction * ((345e3 - 70e3) * 2.9e-4 * (1.0 - 128.0 * stroke(i)) - 3800.0 * stroke(i)) + 0.1 * noise(i)
+    };
+    for seed in 0..10 {
+        let mut campaign = campaign(seed);
+        campaign.recordings.push(Recording {
+            name: "slow".into(),
+            time: (0..rows).map(|i| 0.01 * i as f64 + if i < 1200 { 0.0 } else { 20.0 }).collect(),
+            force: Some((0..rows).map(pull).collect()),
+            pressure: (0..rows).map(|i| 345e3 + 300.0 * noise(i)).collect(),
+            stroke: (0..rows).map(|i| stroke(i) + 4e-6 * noise(i + 5)).collect(),
+            ..Recording::default()
+        });
+        assert_eq!(faults(&campaign), [], "seed {seed}");
+        campaign.recordings[6].force.as_mut().unwrap()[430..470].fill(130.0);
+        let found: Vec<_> = faults(&campaign).into_iter().map(|f| (f.rows, f.channel)).collect();
+        assert_eq!(found, [(430..470, Channel::Force)], "seed {seed}");
+    }
+}
+
 #[test]
 fn a_force_that_is_cut_in_one_file_is_found() {
     let found = faults(&spoiled(3, Channel::Force, |c| c.iter_mut().for_each(|f| *f = f.min(40.0))));
