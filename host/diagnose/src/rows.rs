@@ -3,7 +3,9 @@
 mod blocks;
 mod gather;
 mod levels;
+
 mod readings;
+mod sensor_noise;
 mod sleeve;
 mod tares;
 

@@ -6,6 +6,7 @@ use model_core::motion::Motion as MotionSample;
 use model_core::units::Length;
 
 use super::readings;
+use super::sensor_noise::{smoothed_pressure, smoothed_stroke};
 use super::sleeve::{self, Shape};
 use crate::criteria::baseline::TABLE_ORDER;
 use crate::criteria::rows::{TARGET_ROWS, TURN_SAMPLES, TURNED_BACK};
@@ -113,9 +114,12 @@ struct Moved<'a> {
     ringing: &'a [bool],
 }
 
-/// The readings of a recording's force, whether each stands out alone, and whether the pressure beside it was read.
+/// The readings of a recording's force, pressure and stroke without the noise of their sensors, whether each force stands out alone, and whether the
+/// pressure beside it was read.
 #[derive(Clone, Copy)]
 struct Readings<'a> {
+    pressure: &'a [f64],
+    stroke: &'a [f64],
     force: &'a [f64],
     spike: &'a [bool],
     read: &'a [bool],
@@ -165,7 +169,9 @@ impl Gathering<'_> {
         self.rows.ringing += ringing.iter().filter(|r| **r).count();
         let moved = Moved { samples: &samples, state: &state, ringing: &ringing };
         let spike = readings::spikes(force);
-        let readings = Readings { force, spike: &spike, read };
+        let pressure = smoothed_pressure(&recording.pressure, force, self.pull(&recording.stroke));
+        let stroke = smoothed_stroke(&recording.stroke);
+        let readings = Readings { pressure: &pressure, stroke: &stroke, force, spike: &spike, read };
         let mut previous: Option<f64> = None;
         let mut piece = None;
         let mut i = 0;
@@ -184,6 +190,12 @@ impl Gathering<'_> {
             i = j;
         }
         Ok(())
+    }
+
+    /// Force per pressure at the middle of these strokes, m².
+    fn pull(&self, stroke: &[f64]) -> f64 {
+        let middle = stroke.iter().sum::<f64>() / stroke.len() as f64;
+        self.braid.posture(Length::from_metres(middle)).area
     }
 
     /// Where the row that begins at a sample ends: before the next turn, hold or ramp, where a ring begins or ends, or when it is full.
@@ -209,7 +221,7 @@ impl Gathering<'_> {
         moved: Moved<'_>,
         samples: std::ops::Range<usize>,
     ) -> Average {
-        let Readings { force, spike, read } = *readings;
+        let Readings { pressure, stroke, force, spike, read } = *readings;
         let good = |j: &usize| read[*j] && !spike[*j] && self.ends.iter().all(|end| force[*j] != end.force);
         let spiked = samples.clone().filter(|j| read[*j] && spike[*j] && !moved.ringing[*j]).count();
         let mut taken: Vec<usize> = samples.clone().filter(good).collect();
@@ -233,7 +245,7 @@ impl Gathering<'_> {
         Average {
             motion: MotionSample {
                 time: of(|m| m.time),
-                stroke: of(|m| m.stroke),
+                stroke: mean(stroke),
                 speed: of(|m| m.speed),
                 acceleration: of(|m| m.acceleration),
                 pressure_rate: of(|m| m.pressure_rate),
@@ -244,7 +256,7 @@ impl Gathering<'_> {
                 ..first
             },
             local: mean(&recording.time) - recording.time[0],
-            pressure: mean(&recording.pressure),
+            pressure: mean(pressure),
             still: mean(&moved.state.still),
             force,
             good: count,

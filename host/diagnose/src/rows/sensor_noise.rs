@@ -1,0 +1,110 @@
+//! Readings of pressure and stroke without most of the noise of their sensors.
+//!
+//! The model computes its force from the pressure and the stroke that were read. The noise of these readings is then an error of the model's
+//! force, and any effect that smooths this force explains a part of it: a filter in the force channel above all. (It is the problem of errors
+//! in the variables: W. A. Fuller, Measurement Error Models, Wiley 1987, section 1.2.)
+
+use crate::criteria::rows::{SMOOTHED, SMOOTHED_ABOVE};
+use pam_data::recording::white_noise;
+
+/// Readings on either side of one that is smoothed.
+const HALF: usize = SMOOTHED / 2;
+
+/// Pressures without the part of their scatter that the force does not follow. `pull` is the force per pressure, m².
+pub(super) fn smoothed_pressure(pressure: &[f64], force: &[f64], pull: f64) -> Vec<f64> {
+    let noise = white_noise(pressure) * (1.0 - share_felt(pressure, force, pull)).sqrt();
+    smooth(pressure, noise)
+}
+
+/// Strokes without the scatter of their sensor. No muscle moves back and forth from reading to reading.
+pub(super) fn smoothed_stroke(stroke: &[f64]) -> Vec<f64> {
+    smooth(stroke, white_noise(stroke))
+}
+
+/// The share of the pressure's fast scatter that the muscle feels: where the regulator makes it, the force follows; where the sensor makes
+/// it, it does not. From second differences, which slow changes hardly enter.
+fn share_felt(pressure: &[f64], force: &[f64], pull: f64) -> f64 {
+    let second = |x: &[f64]| x[0] - 2.0 * x[1] + x[2];
+    let (mut both, mut squares) = (0.0, 0.0);
+    for (p, f) in pressure.windows(3).zip(force.windows(3)) {
+        let (p, f) = (second(p), second(f));
+        both += p * f;
+        squares += p * p;
+    }
+    let share = both / (squares * pull);
+    if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// A series without white noise of this standard deviation: each value moves to the mean of its neighbours, which is that of a line through
+/// them, where the scatter about the line is that of the noise; it stays where the series changes faster (J. S. Lee, IEEE Trans. Pattern
+/// Anal. Mach. Intell. 2 (1980) 165–168, with a line in place of a constant). It delays nothing.
+fn smooth(series: &[f64], noise: f64) -> Vec<f64> {
+    let mut smoothed = series.to_vec();
+    if !(noise > 0.0) {
+        return smoothed;
+    }
+    let squares: f64 = (1..=HALF).map(|k| 2.0 * (k * k) as f64).sum();
+    let usual = SMOOTHED_ABOVE * noise * noise;
+    for (window, value) in series.windows(SMOOTHED).zip(&mut smoothed[HALF..]) {
+        let mean = window.iter().sum::<f64>() / SMOOTHED as f64;
+        let slope =
+            (1..=HALF).map(|k| k as f64 * (window[HALF + k] - window[HALF - k])).sum::<f64>() / squares;
+        let off = |(k, v): (usize, &f64)| (v - mean - slope * (k as f64 - HALF as f64)).powi(2);
+        let scatter = window.iter().enumerate().map(off).sum::<f64>() / (SMOOTHED - 2) as f64;
+        let kept = if scatter > usual { 1.0 - usual / scatter } else { 0.0 };
+        *value = mean + kept * (*value - mean);
+    }
+    smoothed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(i: usize) -> f64 {
+        (43_758.5 * (12.9898 * i as f64).sin()).rem_euclid(1.0) - 0.5
+    }
+
+    fn deviation(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
+        let squares: f64 = a.iter().enumerate().map(|(i, x)| (x - b(i)).powi(2)).sum();
+        (squares / a.len() as f64).sqrt()
+    }
+
+    const PULL: f64 = 2e-4;
+
+    #[test]
+    fn the_noise_of_the_sensor_goes_and_what_the_muscle_feels_stays() {
+        let (level, scatter) = (300e3, |i: usize| 1.5e3 * noise(i));
+        let read: Vec<f64> = (0..5000).map(|i| level + scatter(i)).collect();
+        let of_true: Vec<f64> = (0..5000).map(|i| PULL * level + 0.05 * noise(i + 7000)).collect();
+        assert!(
+            deviation(&smoothed_pressure(&read, &of_true, PULL), |_| level)
+                < 0.45 * deviation(&read, |_| level)
+        );
+        let of_read: Vec<f64> =
+            read.iter().enumerate().map(|(i, p)| PULL * p + 0.05 * noise(i + 7000)).collect();
+        assert!(
+            deviation(&smoothed_pressure(&read, &of_read, PULL), |i| read[i])
+                < 0.1 * deviation(&read, |_| level)
+        );
+    }
+
+    #[test]
+    fn steps_and_ramps_of_the_pressure_stay_where_they_are() {
+        let pressure = |i: usize| match i % 400 {
+            k @ 0..200 => 100e3 + 1e3 * k as f64,
+            _ => 150e3,
+        };
+        let read: Vec<f64> = (0..2000).map(|i| pressure(i) + 400.0 * noise(i)).collect();
+        let smooth = smooth(&read, white_noise(&read));
+        assert!(smooth.iter().enumerate().all(|(i, p)| (p - pressure(i)).abs() < 400.0), "{smooth:?}");
+    }
+
+    #[test]
+    fn short_constant_and_unfelt_series_stay() {
+        for series in [&[][..], &[1.0, 2.0], &[3.0; 40]] {
+            assert_eq!(smoothed_pressure(series, series, PULL), series);
+        }
+        assert_eq!(share_felt(&[1.0, 2.0, 1.0], &[1.0, 2.0, 1.0], 0.0), 0.0);
+    }
+}
