@@ -196,7 +196,7 @@ fn remarks(view: &View<'_>) -> Section {
         (rows.pushed, "muscle pushed by the rig"),
         (rows.clipped, "force sensor at the end of its range"),
         (rows.outliers, "outliers"),
-        (rows.dropouts, "pressure gauge dropped out"),
+        (rows.dropouts, "sensor failed, or load held by a stop or by friction"),
     ];
     let named: Vec<String> = excluded
         .iter()

@@ -12,6 +12,7 @@ use std::borrow::Cow;
 use std::cell::LazyCell;
 use std::ops::Range;
 
+use super::constant_load::{self, HeldLoad};
 use super::sensor_faults::{self, Kind, SensorFault, sensor_faults};
 use super::unit_check::{InconsistentRecording, inconsistent_recordings};
 use super::{Campaign, Recording};
@@ -47,6 +48,8 @@ pub struct Screened<'a> {
     pub dropouts: Vec<Dropout>,
     /// Other failures of sensors, in the order of recordings and rows.
     pub faults: Vec<SensorFault>,
+    /// Rows in which a constant load does not rest on the muscle alone, in the order of recordings and rows.
+    pub held_loads: Vec<HeldLoad>,
 }
 
 /// At most this many drop-outs or recordings are listed one by one.
@@ -80,7 +83,8 @@ impl<'a> Screened<'a> {
         for fault in faults.iter().filter(|f| f.has_bridge()) {
             fault.bridge(&mut campaign.to_mut().recordings[fault.recording]);
         }
-        Self { campaign, inconsistent, dropouts, faults }
+        let held_loads = constant_load::find(&campaign, &odd);
+        Self { campaign, inconsistent, dropouts, faults, held_loads }
     }
 
     /// Whether a whole recording is of no use: another unit, sign or zero than the others, or a dead sensor.
@@ -90,11 +94,12 @@ impl<'a> Screened<'a> {
         self.inconsistent.iter().any(|a| a.recording == index) || self.faults.iter().any(dead)
     }
 
-    /// The rows of one recording in which a sensor failed, in order and without overlap.
+    /// The rows of one recording in which a sensor failed, or something else holds the load; in order and without overlap.
     pub fn of_recording(&self, index: usize) -> impl Iterator<Item = Range<usize>> + use<> {
         let dropped = self.dropouts.iter().filter(|d| d.recording == index).map(|d| d.rows.clone());
         let failed = self.faults.iter().filter(|f| f.recording == index).map(|f| f.rows.clone());
-        let mut all: Vec<Range<usize>> = dropped.chain(failed).collect();
+        let held = self.held_loads.iter().filter(|h| h.recording == index).map(|h| h.rows.clone());
+        let mut all: Vec<Range<usize>> = dropped.chain(failed).chain(held).collect();
         all.sort_by_key(|rows| rows.start);
         let mut merged: Vec<Range<usize>> = Vec::with_capacity(all.len());
         for rows in all {
@@ -106,7 +111,7 @@ impl<'a> Screened<'a> {
         merged.into_iter()
     }
 
-    /// For each row of a recording, whether it is free of drop-outs and consistent.
+    /// For each row of a recording, whether it counts: the recording is consistent, no sensor failed, and nothing else holds the load.
     #[must_use]
     pub fn read(&self, index: usize) -> Vec<bool> {
         let right = !self.is_inconsistent(index);
@@ -133,8 +138,9 @@ impl<'a> Screened<'a> {
             .checked_sub(LISTED + 1)
             .map(|n| format!("{} more recordings are inconsistent", n + 1));
         let faults = sensor_faults::describe(&self.faults, &self.campaign);
+        let held = constant_load::describe(&self.held_loads, &self.campaign);
         let parts: Vec<String> =
-            inconsistent.chain(more).chain(self.remark_on_dropouts()).chain(faults).collect();
+            inconsistent.chain(more).chain(self.remark_on_dropouts()).chain(faults).chain(held).collect();
         (!parts.is_empty()).then(|| parts.join(". "))
     }
 

@@ -12,10 +12,10 @@ pam_data::criteria! {
     SPIKE_RANGE: f64 = 0.004, "F_spike/range", "1", Judgement;
     /// ... and by this many times the median change from reading to reading beside it.
     SPIKE_CHANGE: f64 = 3.0, "n_change", "1", Derived("where an even motion turns, the median of five is two changes away");
-    /// Readings of the pressure of which a line is taken where they scatter as the sensor does; odd.
-    SMOOTHED: usize = 7, "n_line", "1", Judgement;
-    /// They scatter more where their variance about the line is this many times that of the sensor.
-    SMOOTHED_ABOVE: f64 = 2.2, "q_line", "1", Derived("95 % of chi-squared with 5 degrees of freedom, over 5");
+    /// Readings about one of pressure or stroke through which a line is laid, to take the noise of the sensor away; odd.
+    SMOOTHED: ([usize; 3]) = [31, 15, 7], "n_line", "1", Cost;
+    /// They scatter as the sensor does where their variance about the line is below this quantile, in standard deviations of a normal value.
+    SMOOTHED_QUANTILE: f64 = 1.645, "z_line", "1", Convention("95 %");
     /// Spikes are mentioned where they are more than one of this many readings.
     SPIKES_MENTIONED: usize = 200, "1/q_spike", "1", Judgement;
     /// Below this share of the largest force the muscle carries no load: a repeated reading is no end of the sensor's range, a row may be slack.

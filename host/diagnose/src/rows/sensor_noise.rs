@@ -4,11 +4,8 @@
 //! force, and any effect that smooths this force explains a part of it: a filter in the force channel above all. (It is the problem of errors
 //! in the variables: W. A. Fuller, Measurement Error Models, Wiley 1987, section 1.2.)
 
-use crate::criteria::rows::{SMOOTHED, SMOOTHED_ABOVE};
+use crate::criteria::rows::{SMOOTHED, SMOOTHED_QUANTILE};
 use pam_data::recording::white_noise;
-
-/// Readings on either side of one that is smoothed.
-const HALF: usize = SMOOTHED / 2;
 
 /// Pressures without the part of their scatter that the force does not follow. `pull` is the force per pressure, m².
 pub(super) fn smoothed_pressure(pressure: &[f64], force: &[f64], pull: f64) -> Vec<f64> {
@@ -36,25 +33,51 @@ fn share_felt(pressure: &[f64], force: &[f64], pull: f64) -> f64 {
 }
 
 /// A series without white noise of this standard deviation: each value moves to the mean of its neighbours, which is that of a line through
-/// them, where the scatter about the line is that of the noise; it stays where the series changes faster (J. S. Lee, IEEE Trans. Pattern
-/// Anal. Mach. Intell. 2 (1980) 165–168, with a line in place of a constant). It delays nothing.
+/// them, where the scatter about the line is that of the noise. Of several windows the widest counts for which this is so; where the series
+/// changes faster than a line in the narrowest, it stays the more, the larger the scatter (J. S. Lee, IEEE Trans. Pattern Anal. Mach. Intell. 2
+/// (1980) 165–168, with a line in place of a constant). It delays nothing.
 fn smooth(series: &[f64], noise: f64) -> Vec<f64> {
     let mut smoothed = series.to_vec();
     if !(noise > 0.0) {
         return smoothed;
     }
-    let squares: f64 = (1..=HALF).map(|k| 2.0 * (k * k) as f64).sum();
-    let usual = SMOOTHED_ABOVE * noise * noise;
-    for (window, value) in series.windows(SMOOTHED).zip(&mut smoothed[HALF..]) {
-        let mean = window.iter().sum::<f64>() / SMOOTHED as f64;
-        let slope =
-            (1..=HALF).map(|k| k as f64 * (window[HALF + k] - window[HALF - k])).sum::<f64>() / squares;
-        let off = |(k, v): (usize, &f64)| (v - mean - slope * (k as f64 - HALF as f64)).powi(2);
-        let scatter = window.iter().enumerate().map(off).sum::<f64>() / (SMOOTHED - 2) as f64;
-        let kept = if scatter > usual { 1.0 - usual / scatter } else { 0.0 };
-        *value = mean + kept * (*value - mean);
+    let limits = SMOOTHED.map(|n| noise * noise * chi_squared_over_degrees(n as f64 - 2.0));
+    for (i, value) in smoothed.iter_mut().enumerate() {
+        for (n, limit) in SMOOTHED.into_iter().zip(limits) {
+            let half = n / 2;
+            let Some(window) = i.checked_sub(half).and_then(|from| series.get(from..=i + half)) else {
+                continue;
+            };
+            let (mean, scatter) = about_line(window);
+            if scatter <= limit {
+                *value = mean;
+                break;
+            }
+            if n == SMOOTHED[SMOOTHED.len() - 1] {
+                *value = mean + (1.0 - limit / scatter) * (*value - mean);
+            }
+        }
     }
     smoothed
+}
+
+/// The mean of an odd number of values, and their variance about a line through them.
+fn about_line(window: &[f64]) -> (f64, f64) {
+    let n = window.len() as f64;
+    let mean = window.iter().sum::<f64>() / n;
+    let (mut along, mut squares) = (0.0, 0.0);
+    for (k, v) in window.iter().enumerate() {
+        along += (k as f64 - (n - 1.0) / 2.0) * (v - mean);
+        squares += (v - mean) * (v - mean);
+    }
+    let explained = along * along / (n * (n * n - 1.0) / 12.0);
+    (mean, (squares - explained).max(0.0) / (n - 2.0))
+}
+
+/// The quantile of chi-squared over its degrees of freedom (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931) 684–688).
+fn chi_squared_over_degrees(degrees: f64) -> f64 {
+    let variance = 2.0 / (9.0 * degrees);
+    (1.0 - variance + SMOOTHED_QUANTILE * variance.sqrt()).powi(3)
 }
 
 #[cfg(test)]

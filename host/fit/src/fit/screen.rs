@@ -21,7 +21,7 @@ pub enum PointUse {
     Clipped,
     /// Excluded: the reading is far outside the scatter of the others.
     Outlier,
-    /// Excluded: the pressure sensor failed for these rows, and their pressure is interpolated.
+    /// Excluded: a sensor failed for these rows, or something besides the muscle holds a constant load.
     Dropout,
 }
 
