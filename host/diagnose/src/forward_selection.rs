@@ -273,13 +273,19 @@ impl<'a> ForwardSelection<'a> {
         let score = winner.score * (independent / self.scale.independent).min(1.0);
         let slow = self.library[winner.candidate].traits.slow;
         let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
-        if !kept || score < least {
+        // What is impossible may have become so only beside the refitted model.
+        let possible = |f: &CandidateFit| self.library[f.candidate].is_consistent(&f.amplitudes, &f.shapes);
+        let refusal = if !kept {
+            Some(Refusal::LostInRefit)
+        } else if score < least {
+            Some(Refusal::SlowDrift)
+        } else {
+            (!joint.fits.iter().all(possible)).then_some(Refusal::ImpossibleInRefit)
+        };
+        if let Some(why) = refusal {
             // The effects before it stay as they were fitted without it.
             self.excluded.push(winner.candidate);
-            self.remarks.push(Remark::Refused {
-                effect: name.to_owned(),
-                why: if kept { Refusal::SlowDrift } else { Refusal::LostInRefit },
-            });
+            self.remarks.push(Remark::Refused { effect: name.to_owned(), why });
             return;
         }
         self.kind = beside;

@@ -83,6 +83,8 @@ pub enum Refusal {
     SlowDrift,
     /// The joint refit keeps little of its gain.
     LostInRefit,
+    /// The joint refit gives an effect parameters that cannot belong to one cause.
+    ImpossibleInRefit,
 }
 
 /// One remark on what can and cannot be concluded.

@@ -38,10 +38,11 @@ impl Effect for PreslidingHysteresis {
         source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops).changed(
-        Changed::new(Class::TurningMemory, Owner::Muscle, "friction builds up after a reversal")
-            .remembering(),
-    );
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::NestedLoops).consistent(no_more_than_the_friction).changed(
+            Changed::new(Class::TurningMemory, Owner::Muscle, "friction builds up after a reversal")
+                .remembering(),
+        );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [z_1…z_4, last stroke, last pressure, seen]
@@ -58,4 +59,10 @@ impl Effect for PreslidingHysteresis {
         let friction = parameters[0] * context.friction * context.quasi.abs() + parameters[1];
         friction * (context.direction - built)
     }
+}
+
+/// No more can build up than the friction that the table has: `a` is 1 at most, and 2 where strokes so short that not all strands slide have
+/// halved the table's friction.
+fn no_more_than_the_friction(amplitudes: &[f64], _shapes: &[f64]) -> bool {
+    !matches!(amplitudes, [share, ..] if !(*share <= 2.0))
 }

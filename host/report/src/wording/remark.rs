@@ -183,6 +183,9 @@ fn refused(effect: &str, why: &Refusal) -> String {
         Refusal::SlowDrift => format!(
             "{effect} not named: it would explain much of the excess error, but so would a slowly drifting sensor"
         ),
+        Refusal::ImpossibleInRefit => format!(
+            "{effect} not named: it would explain much of the excess error, but the joint fit gives parameters that are impossible"
+        ),
         Refusal::LostInRefit => format!(
             "{effect} not named: it would explain much of the excess error, but little remains of it in the joint fit"
         ),
