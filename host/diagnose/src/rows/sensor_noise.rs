@@ -74,7 +74,7 @@ fn about_line(window: &[f64]) -> (f64, f64) {
     (mean, (squares - explained).max(0.0) / (n - 2.0))
 }
 
-/// The quantile of chi-squared over its degrees of freedom (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931) 684–688).
+/// The quantile of chi-squared over its degrees of freedom (E. B. Wilson and M. Hilferty, PNAS 17 (1931) 684–688).
 fn chi_squared_over_degrees(degrees: f64) -> f64 {
     let variance = 2.0 / (9.0 * degrees);
     (1.0 - variance + SMOOTHED_QUANTILE * variance.sqrt()).powi(3)

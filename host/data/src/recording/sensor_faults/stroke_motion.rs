@@ -1,4 +1,4 @@
-//! Where a muscle turns, stops, sets off, or is slow, by the readings of its stroke around a row.
+//! Reversals, stops, starts, and slow motion of a muscle, from the readings of its stroke around a row.
 
 use crate::recording::white_noise;
 use crate::statistics::median;
@@ -41,7 +41,7 @@ impl<'a> StrokeMotion<'a> {
         Some((self.stroke[to] - self.stroke[row]).signum())
     }
 
-    /// Whether the muscle turns, stops or sets off by a row, as the motion in so many rows before and after shows.
+    /// Whether the muscle turns, stops or sets off by a row, as the motion in this number of rows before and after shows.
     pub(super) fn turns(&self, row: usize, rows: usize) -> bool {
         let rows = rows.max(TURN_ROWS);
         let near = row.saturating_sub(TURN_ROWS)..self.stroke.len().min(row + 2);
