@@ -43,7 +43,8 @@ pub(super) fn find(campaign: &Campaign, odd: &[bool]) -> Vec<HeldLoad> {
 fn held(r: &Recording, top: f64) -> impl Iterator<Item = Range<usize>> + use<> {
     let mut found = Vec::new();
     let (lowest, highest) = range(&r.pressure);
-    if has_constant_load(r) && highest - lowest >= PRESSURE_RANGE * top {
+    // The range first: loops at one pressure need no quantiles of their forces.
+    if highest - lowest >= PRESSURE_RANGE * top && has_constant_load(r) {
         let (shortest, longest) = range(&r.stroke);
         let stays = (STAYS.0 * (longest - shortest)).max(STAYS.1 * white_noise(&r.stroke));
         let mut start = 0;

@@ -31,10 +31,10 @@ fn share_felt(pressure: &[f64], force: &[f64], pull: f64) -> f64 {
     if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// A series with white scatter of this standard deviation, without the share of it that is not `felt`: each value moves to the mean of its neighbours, which is that of a line through
-/// them, where the scatter about the line is that of the noise. Of several windows the widest counts for which this is so; where the series
-/// changes faster than a line in the narrowest, it stays the more, the larger the scatter (J. S. Lee, IEEE Trans. Pattern Anal. Mach. Intell. 2
-/// (1980) 165–168, with a line in place of a constant). It delays nothing.
+/// A series with white scatter of this standard deviation, without the share of it that is not `felt`: each value moves to the mean of its
+/// neighbours, which is that of a line through them, where the scatter about the line is that of the noise. Of several windows the widest
+/// counts for which this is so; where the series changes faster than a line in the narrowest, it stays the more, the larger the scatter
+/// (J. S. Lee, IEEE Trans. Pattern Anal. Mach. Intell. 2 (1980) 165–168, with a line in place of a constant). It delays nothing.
 fn smooth(series: &[f64], scatter: f64, felt: f64) -> Vec<f64> {
     let mut smoothed = series.to_vec();
     if !(scatter > 0.0) {
