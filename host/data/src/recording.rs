@@ -10,7 +10,7 @@ mod cells;
 mod column_plan;
 mod column_table;
 mod columns;
-pub mod constant_load;
+mod constant_load;
 mod container;
 mod decimal;
 pub mod dropouts;

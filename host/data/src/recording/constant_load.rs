@@ -12,7 +12,7 @@ use crate::statistics::quantile;
 
 /// Rows of a recording in which the load does not rest on the muscle alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct HeldLoad {
+pub(super) struct HeldLoad {
     /// Index of the recording in the campaign.
     pub recording: usize,
     /// The rows in that recording, from 0.

@@ -49,7 +49,7 @@ pub struct Screened<'a> {
     /// Other failures of sensors, in the order of recordings and rows.
     pub faults: Vec<SensorFault>,
     /// Rows in which a constant load does not rest on the muscle alone, in the order of recordings and rows.
-    pub held_loads: Vec<HeldLoad>,
+    held_loads: Vec<HeldLoad>,
 }
 
 /// At most this many drop-outs or recordings are listed one by one.
