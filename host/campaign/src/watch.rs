@@ -1,5 +1,6 @@
 //! Judges the readings while they come: what is dangerous ends the campaign, what is spoiled is repeated.
 
+use pam_data::statistics::extremes;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -160,7 +161,7 @@ impl Watch {
         if clipped(&force, self.blocked) {
             return Some(Spoiled::Clipped);
         }
-        let (low, high) = range(&force);
+        let (low, high) = extremes(&force);
         if low == high || rows.windows(2).all(|w| w[0].pressure == w[1].pressure) {
             return Some(Spoiled::Frozen);
         }
@@ -176,7 +177,7 @@ impl Watch {
             | Step::Speeds { .. }
             | Step::Nested { .. }
             | Step::Rest { .. } => {
-                let (from, to) = range(&stroke);
+                let (from, to) = extremes(&stroke);
                 if !(to - from > 0.0) {
                     return Some(Spoiled::Frozen);
                 }
@@ -191,13 +192,9 @@ impl Watch {
     }
 }
 
-fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
-}
-
 /// Whether equal readings at the upper end follow each other, where the force has a range worth the name.
 fn clipped(force: &[f64], blocked: f64) -> bool {
-    let (low, high) = range(force);
+    let (low, high) = extremes(force);
     if !(high - low > 0.05 * blocked.max(1e-9)) {
         return false;
     }

@@ -30,6 +30,7 @@ mod mountings;
 mod noise;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod places;
 mod plausibility;
 mod quantity;
 mod read;

@@ -1,6 +1,8 @@
-//! Order statistics: the median and other quantiles, by partial sorting in linear time.
+//! Order statistics: extremes, the median and other quantiles, by partial sorting in linear time.
 //!
 //! Values that are not numbers sort to the ends ([`f64::total_cmp`]), so a few of them do not move a median.
+
+use std::borrow::Borrow;
 
 /// The value of a given rank, 0 for the smallest; the largest where the rank lies beyond the end, and 0 of no values.
 /// Reorders the values.
@@ -34,6 +36,34 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     let xx: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
     let xy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
     if xx > 0.0 { xy / xx } else { 0.0 }
+}
+
+/// The smallest and the largest value; `(inf, -inf)` of no values.
+///
+/// ```
+/// use pam_data::statistics::extremes;
+/// assert_eq!(extremes([3.0, 1.0, 2.0]), (1.0, 3.0));
+/// assert_eq!(extremes(&[] as &[f64]), (f64::INFINITY, f64::NEG_INFINITY));
+/// ```
+#[must_use]
+pub fn extremes(values: impl IntoIterator<Item: Borrow<f64>>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        let value = *value.borrow();
+        (low.min(value), high.max(value))
+    })
+}
+
+/// The largest value minus the smallest; 0 of no values.
+///
+/// ```
+/// use pam_data::statistics::range;
+/// assert_eq!(range([3.0, 1.0, 2.0]), 2.0);
+/// assert_eq!(range(&[] as &[f64]), 0.0);
+/// ```
+#[must_use]
+pub fn range(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
+    let (low, high) = extremes(values);
+    (high - low).max(0.0)
 }
 
 /// The median; of an even number of values the upper of the two in the middle, and 0 of no values. Reorders the values.

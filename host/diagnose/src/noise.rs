@@ -1,5 +1,6 @@
 //! Noise: repeats give its size, its correlation in time the number of rows per independent row; tests use whole blocks.
 
+use pam_data::statistics::extremes;
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
@@ -80,14 +81,9 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
         squares: f64,
         count: f64,
     }
-    let range = rows
-        .contexts()
-        .iter()
-        .zip(rows.root_weight())
-        .filter(|(_, w)| **w > 0.0)
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (c, _)| {
-            (l.min(c.contraction), h.max(c.contraction))
-        });
+    let range = extremes(
+        rows.contexts().iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0).map(|(c, _)| c.contraction),
+    );
     let top = rows.contexts().iter().map(|c| c.pressure).fold(1.0, f64::max);
     let width = ((range.1 - range.0) / REPEAT_BINS).max(1e-6);
     let runs = runs(rows);

@@ -8,6 +8,7 @@ use super::options::Options;
 use super::remark::{Remark, Unjudgeable};
 use super::rows::Rows;
 use super::verdict::{Considered, Diagnosis, HeldOut, Outcome, Pattern, Split, Trace, Unexplained, WhyNot};
+use pam_data::statistics::extremes;
 
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
 pub(super) fn blocked_force(rows: &Rows) -> f64 {
@@ -30,12 +31,8 @@ pub(super) fn unmet_precondition(rows: &Rows, blocked: f64) -> Option<Unjudgeabl
     if highest <= DEAD_GAUGE {
         return Some(Unjudgeable::NoPressure { highest });
     }
-    let (lo, hi) = rows
-        .force
-        .iter()
-        .zip(rows.root_weight())
-        .filter(|(_, w)| **w > 0.0)
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (f, _)| (l.min(*f), h.max(*f)));
+    let (lo, hi) =
+        extremes(rows.force.iter().zip(rows.root_weight()).filter(|(_, w)| **w > 0.0).map(|(f, _)| *f));
     if !(hi - lo > CONSTANT_FORCE * blocked.abs().max(1e-9)) || !(blocked > 0.0) {
         return Some(Unjudgeable::NoForce);
     }

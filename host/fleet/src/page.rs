@@ -1,6 +1,7 @@
 //! The page of a fleet: distributions, outlying muscles, effects by share, groups that differ, failures.
 
 use pam_data::pluralise::pluralise;
+use pam_data::statistics::extremes;
 use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 
 use crate::fleet::{Fleet, Member, Quantity};
@@ -171,8 +172,7 @@ fn distributions(fleet: &Fleet, overview: &Overview) -> Section {
 fn histogram(fleet: &Fleet, overview: &Overview, d: &Distribution) -> Panel {
     let q = &fleet.quantities[d.quantity];
     let values: Vec<f64> = fleet.members.iter().filter_map(|m| m.values[d.quantity]).collect();
-    let (mut low, mut high) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (mut low, mut high) = extremes(&values);
     if let Some(c) = d.centre {
         low = low.max(c.median - WIDEST * c.deviation);
         high = high.min(c.median + WIDEST * c.deviation);

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
+use pam_data::statistics::extremes;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -126,8 +127,7 @@ impl Sheet {
             return;
         }
         let numbers: Vec<f64> = self.columns[column].iter().map(|c| c.parse().unwrap_or(0.0)).collect();
-        let (low, high) =
-            numbers.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let (low, high) = extremes(&numbers);
         let range = if high > low { high - low } else { 1.0 };
         let mut set = |of: &dyn Fn(usize, f64) -> f64| {
             for (i, (cell, v)) in self.columns[column].iter_mut().zip(&numbers).enumerate() {

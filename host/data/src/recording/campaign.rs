@@ -1,7 +1,7 @@
 //! Several recordings of one muscle, in the order in which they happened.
 
 use super::Recording;
-use crate::statistics::median;
+use crate::statistics::{extremes, median};
 
 /// A clock that shows more at the first reading was not started for the campaign, s (a day and some).
 const LONGEST_CLOCK: f64 = 1.0e5;
@@ -145,7 +145,7 @@ fn joined_runs(recording: &Recording) -> Option<String> {
     if pauses.is_empty() {
         return None;
     }
-    let range = stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let range = extremes(stroke.iter());
     let change = |i: &usize| (stroke[*i] - stroke[i - 1]).abs();
     let at = pauses.into_iter().find(|i| change(i) > CHANGE * (range.1 - range.0))?;
     Some(format!(

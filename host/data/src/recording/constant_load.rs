@@ -6,9 +6,10 @@
 
 use std::ops::Range;
 
-use super::{Campaign, Recording, dropouts::rows_and_times, white_noise};
+use super::places::{listed, rows_and_times};
+use super::{Campaign, Recording, white_noise};
 use crate::pluralise::pluralise;
-use crate::statistics::quantile;
+use crate::statistics::{extremes, quantile};
 
 /// Rows of a recording in which the load does not rest on the muscle alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,8 +28,6 @@ const PRESSURE_RANGE: f64 = 0.25;
 const PRESSURE_CHANGE: f64 = 0.05;
 /// The length stays within this share of the recording's stroke, and within this many standard deviations of the sensor's noise.
 const STAYS: (f64, f64) = (0.002, 6.0);
-/// At most this many places are listed.
-const LISTED: usize = 4;
 
 /// All such rows of a campaign, in order. Recordings that are `odd` do not count.
 pub(super) fn find(campaign: &Campaign, odd: &[bool]) -> Vec<HeldLoad> {
@@ -42,16 +41,16 @@ pub(super) fn find(campaign: &Campaign, odd: &[bool]) -> Vec<HeldLoad> {
 
 fn held(r: &Recording, top: f64) -> impl Iterator<Item = Range<usize>> + use<> {
     let mut found = Vec::new();
-    let (lowest, highest) = range(&r.pressure);
+    let (lowest, highest) = extremes(&r.pressure);
     // The range first: loops at one pressure need no quantiles of their forces.
     if highest - lowest >= PRESSURE_RANGE * top && has_constant_load(r) {
-        let (shortest, longest) = range(&r.stroke);
+        let (shortest, longest) = extremes(&r.stroke);
         let stays = (STAYS.0 * (longest - shortest)).max(STAYS.1 * white_noise(&r.stroke));
         let mut start = 0;
         while start < r.len() {
             let moved = |x: &f64| !((x - r.stroke[start]).abs() <= stays);
             let end = r.stroke[start..].iter().position(moved).map_or(r.len(), |n| start + n.max(1));
-            let (low, high) = range(&r.pressure[start..end]);
+            let (low, high) = extremes(&r.pressure[start..end]);
             if high - low >= PRESSURE_CHANGE * top {
                 found.push(start..end);
             }
@@ -68,10 +67,6 @@ fn has_constant_load(r: &Recording) -> bool {
     middle > 0.0 && high - low <= CONSTANT * middle
 }
 
-fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
-}
-
 /// A remark with the places; `None` without such rows.
 pub(super) fn describe(held: &[HeldLoad], campaign: &Campaign) -> Option<String> {
     let rows: usize = held.iter().map(|h| h.rows.len()).sum();
@@ -79,16 +74,12 @@ pub(super) fn describe(held: &[HeldLoad], campaign: &Campaign) -> Option<String>
         let r = &campaign.recordings[h.recording];
         format!("`{}` {}", r.name, rows_and_times(r, &h.rows))
     };
-    let mut places: Vec<String> = held.iter().take(LISTED).map(place).collect();
-    if held.len() > LISTED {
-        places.push(format!("and {}", pluralise(held.len() - LISTED, "more place")));
-    }
     (rows > 0).then(|| {
         format!(
             "constant load: {} excluded in which the length stays while the pressure changes, because a stop, the taut braid or friction \
              carries a part of the load: {}",
             pluralise(rows, "row"),
-            places.join("; ")
+            listed(held.iter().map(place))
         )
     })
 }

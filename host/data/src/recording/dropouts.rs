@@ -13,6 +13,7 @@ use std::cell::LazyCell;
 use std::ops::Range;
 
 use super::constant_load::{self, HeldLoad};
+use super::places::{LISTED, listed, rows_and_times};
 use super::sensor_faults::{self, Kind, SensorFault, sensor_faults};
 use super::unit_check::{InconsistentRecording, inconsistent_recordings};
 use super::{Campaign, Recording};
@@ -52,8 +53,6 @@ pub struct Screened<'a> {
     held_loads: Vec<HeldLoad>,
 }
 
-/// At most this many drop-outs or recordings are listed one by one.
-const LISTED: usize = 4;
 /// A reading below this share of the one before counts as zero.
 const NOTHING: f64 = 0.01;
 
@@ -156,10 +155,6 @@ impl<'a> Screened<'a> {
 
     fn remark_on_dropouts(&self) -> Option<String> {
         let first = self.dropouts.first()?;
-        let mut places: Vec<String> = self.dropouts.iter().take(LISTED).map(|d| self.place(d)).collect();
-        if self.dropouts.len() > LISTED {
-            places.push(format!("and others, {} drop-outs in all", self.dropouts.len()));
-        }
         let units: Vec<_> = self.dropouts.iter().map(|d| d.factor.and_then(unit)).collect();
         let ratio = units[0].filter(|first| units.iter().all(|u| *u == Some(*first)));
         let cause = match ratio {
@@ -173,7 +168,7 @@ impl<'a> Screened<'a> {
             "drop-out of the pressure sensor (a step away and back, each within one reading, without a reaction of the force); {} \
              excluded: {}; {cause}",
             pluralise(self.rows(), "row"),
-            places.join("; ")
+            listed(self.dropouts.iter().map(|d| self.place(d)))
         ))
     }
 
@@ -185,17 +180,6 @@ impl<'a> Screened<'a> {
         });
         let place = rows_and_times(r, &d.rows);
         format!("{} {place} from {} to {} kPa{share}", r.name, kpa(d.beside), kpa(d.read))
-    }
-}
-
-/// Rows of a recording, counted from 1 as in its file, and their times.
-pub(super) fn rows_and_times(r: &Recording, rows: &Range<usize>) -> String {
-    let row = |i: usize| 1 + r.rows.as_ref().map_or(i, |rows| rows[i] as usize);
-    let (first, last) = (rows.start, rows.end - 1);
-    if first == last {
-        format!("row {} ({:.2} s)", row(first), r.time[first])
-    } else {
-        format!("rows {} to {} ({:.2} to {:.2} s)", row(first), row(last), r.time[first], r.time[last])
     }
 }
 

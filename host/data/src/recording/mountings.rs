@@ -1,6 +1,7 @@
 //! Recordings at held lengths: which of them belong to one mounting, and how the muscle rested before each.
 
 use super::{Campaign, Clock, Recording};
+use crate::statistics::extremes;
 
 /// The largest change of a held length within one mounting, m: half of a tape measure's ±1 mm.
 pub const SAME_LENGTH: f64 = 0.5e-3;
@@ -39,8 +40,7 @@ pub struct Rest {
 
 /// The length that a recording held throughout, as a stroke in metres.
 fn held(recording: &Recording) -> Option<f64> {
-    let (low, high) =
-        recording.stroke.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(*s), h.max(*s)));
+    let (low, high) = extremes(&recording.stroke);
     (high - low <= SAME_LENGTH).then_some(0.5 * (low + high))
 }
 

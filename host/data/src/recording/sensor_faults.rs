@@ -22,7 +22,8 @@ mod tests;
 
 use std::ops::Range;
 
-use super::dropouts::{ExpectedForce, rows_and_times};
+use super::dropouts::ExpectedForce;
+use super::places::{listed, rows_and_times};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
 use crate::statistics::{median, quantile};
@@ -162,8 +163,6 @@ const CLEAR: f64 = 6.0;
 const UNUSUALLY: (f64, f64) = (0.05, 2.0);
 /// Some thousand rows of a recording are examined.
 const EXAMINED: usize = 4000;
-/// At most this many faults are listed one by one.
-const LISTED: usize = 4;
 
 fn stride(rows: usize) -> usize {
     (rows / EXAMINED).max(1)
@@ -256,15 +255,11 @@ pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<Strin
             Kind::DropOut => ("steps away and back within one row each", "check connector and cable"),
         };
         let name = channel.name();
-        let mut places: Vec<String> = of.iter().take(LISTED).map(|f| f.place(campaign)).collect();
-        if of.len() > LISTED {
-            places.push(format!("and {} more places", of.len() - LISTED));
-        }
         let rows: usize = of.iter().map(|f| f.rows.len()).sum();
         Some(format!(
             "failed sensor: the {name} {what}; {} excluded: {}; {remedy} of the {name}",
             pluralise(rows, "row"),
-            places.join("; ")
+            listed(of.iter().map(|f| f.place(campaign)))
         ))
     };
     pairs.filter_map(sentence).collect()

@@ -3,6 +3,7 @@
 use super::criteria::{FILTER_TIMES, FOLLOWED_OVER, LEAST_POINTS, LEAST_RUNS, LEAST_SPAN};
 use super::staircase::{self, Point};
 use pam_data::recording::{Campaign, Clock};
+use pam_data::statistics::range;
 
 /// One recording at held length.
 #[derive(Clone, Debug)]
@@ -123,17 +124,12 @@ pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
         points.averaged |= averaged;
         add(&mut points, campaign, index, &settled);
     }
-    let range = range(points.pressure.iter());
-    let covers = |r: &Run| self::range(points.pressure[r.points.0..r.points.1].iter()) >= LEAST_SPAN * range;
+    let whole = range(&points.pressure);
+    let covers = |r: &Run| range(&points.pressure[r.points.0..r.points.1]) >= LEAST_SPAN * whole;
     let repeated = points.mountings.iter().any(|m| m.runs.len() >= 2);
     let enough = points.len() as f64 >= LEAST_POINTS && points.runs.len() as f64 >= LEAST_RUNS;
-    let staircase = range > 0.0 && points.runs.iter().all(covers) && points.largest_force() > 0.0;
+    let staircase = whole > 0.0 && points.runs.iter().all(covers) && points.largest_force() > 0.0;
     (repeated && enough && staircase).then_some(points)
-}
-
-fn range<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-    high - low
 }
 
 fn add(points: &mut Points, campaign: &Campaign, index: usize, settled: &[Point]) {

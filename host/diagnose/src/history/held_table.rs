@@ -21,6 +21,7 @@ use model_core::effects::{EffectName, FittedEffect};
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
 use nalgebra::{DMatrix, DVector};
+use pam_data::statistics::extremes;
 use pam_fit::numerics::jackknife::covariance_root;
 use pam_fit::numerics::spline_basis::SplineBasis;
 use pam_fit::numerics::symmetric::dot;
@@ -105,8 +106,7 @@ impl<'a> Problem<'a> {
         let pulls: Vec<bool> = (0..points.len()).map(|i| use_point[i] && force[i] > least).collect();
         let slack = (0..points.len()).map(|i| use_point[i] && !pulls[i]).collect();
         let pressures = || (0..points.len()).filter(|i| pulls[*i]).map(|i| points.pressure[i] * 1e3);
-        let (low, high) =
-            pressures().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        let (low, high) = extremes(pressures());
         if !(high > low) {
             return None;
         }

@@ -13,6 +13,7 @@
 //!
 //! The law was found on isometric recordings at four lengths; under motion it is a prediction.
 
+use pam_data::statistics::extremes;
 use rayon::prelude::*;
 
 use super::campaign::Points;
@@ -92,8 +93,7 @@ impl<'a> Layer<'a> {
         let thresholds = thresholds(points);
         let pauses = if points.pauses_known() { &PAUSES[..1] } else { &PAUSES[..] };
         let clocks = pauses.iter().map(|p| (*p, Clockwork::new(points, *p, times))).collect();
-        let (low, high) =
-            thresholds.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(*t), h.max(*t)));
+        let (low, high) = extremes(&thresholds);
         // One mounting tells c (P_th − P_b) only; two tell P_b where their carried parts differ.
         let balance_is_free = low < NEAR_BALANCE * BALANCE_START && high - low > RAMP;
         let spline = shift_fit::shifted_spline(points.highest());

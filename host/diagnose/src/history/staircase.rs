@@ -7,7 +7,7 @@ use crate::criteria::valve_pulses::{WINDOW_FROM, WINDOW_TO};
 use crate::rest_friction::followed;
 use crate::valve_pulses::{self, ValvePulses};
 use pam_data::recording::Recording;
-use pam_data::statistics::slope;
+use pam_data::statistics::{extremes, slope};
 
 /// The mean of the last part of a pulse period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,9 +155,7 @@ fn held_directions(stated: &[i8]) -> Vec<i8> {
 
 /// Direction of the drive at settled points, by the turns of their pressure: single rows would turn with each ring.
 fn turns(points: &mut [Point]) {
-    let range = points
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.pressure), h.max(p.pressure)));
+    let range = extremes(points.iter().map(|p| p.pressure));
     let turn = STAIRCASE_TURN * (range.1 - range.0);
     let (mut extreme, mut now) = (0, 0_i8);
     for i in 0..points.len() {

@@ -4,6 +4,7 @@
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording, largest_force};
+use pam_data::statistics::extremes;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 use rayon::prelude::*;
@@ -165,8 +166,7 @@ impl LeftOut {
             Self::Mountings => {
                 let stroke = |r: usize| campaign.recordings[r].stroke.first().copied().unwrap_or(0.0);
                 let strokes = || (0..runs).map(stroke);
-                let (low, high) =
-                    strokes().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s), h.max(s)));
+                let (low, high) = extremes(strokes());
                 let between = |fold: &Vec<bool>| {
                     let own = (0..runs).find(|r| !fold[*r]).map(stroke);
                     own.is_some_and(|s| s > low && s < high)

@@ -57,7 +57,7 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
 fn rests(run: &Run) -> Vec<Rest> {
     let rows = motion::at_rest(&run.time, &run.pressure, LOSS_AFTER);
     let largest = run.pressure.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
-    let range = motion::range(&run.pressure);
+    let range = pam_data::statistics::range(&run.pressure);
     let mut all = Vec::new();
     let (mut start, mut last_end): (usize, Option<f64>) = (0, None);
     for part in rows.chunk_by(|a, b| a == b) {

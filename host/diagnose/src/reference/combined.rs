@@ -6,6 +6,7 @@
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 use nalgebra::{DMatrix, DVector};
+use pam_data::statistics::{extremes, range};
 
 use super::answer::NotComparable;
 use super::criteria::{
@@ -13,7 +14,7 @@ use super::criteria::{
     COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS, STROKES_ENDS,
     TABLE_SURFACE_STEP, TURN,
 };
-use super::motion::{range, turning};
+use super::motion::turning;
 use super::runs::{Mounted, Run, Runs, mounted_anew};
 use super::strokes::{ends, percentile};
 use super::surface::{Surface, bin};
@@ -41,7 +42,7 @@ pub(super) fn swings(r: &Recording) -> bool {
     for (p, x) in r.pressure.iter().zip(&r.stroke) {
         at[bin(*p, low, high, COMBINED_LENGTHS)].push(*x);
     }
-    let spread = at.iter().map(|x| range(x)).fold(0.0, f64::max);
+    let spread = at.iter().map(range).fold(0.0, f64::max);
     turns >= COMBINED_TURNS && spread > COMBINED_SWING * travel
 }
 
@@ -67,7 +68,7 @@ impl Plane {
     fn of(campaign: &Campaign) -> Result<Self> {
         let columns = |of: fn(&Recording) -> &Vec<f64>| {
             let all = campaign.recordings.iter().flat_map(|r| of(r).iter().copied());
-            all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+            extremes(all)
         };
         let (pressures, strokes) = (columns(|r| &r.pressure), columns(|r| &r.stroke));
         let mut bins = vec![[0.0; 4]; 2 * POINT_BINS * POINT_BINS];
@@ -227,7 +228,7 @@ fn add(runs: &mut Runs, campaign: &Campaign, after: bool, slope: &Slope<'_>) -> 
     let parts = runs.strokes.len();
     let half = match runs.strokes.as_slice() {
         [first, second, ..] => (second - first) / 2.0,
-        _ => range(&campaign.recordings.iter().flat_map(|r| r.stroke.clone()).collect::<Vec<_>>()) / 2.0,
+        _ => range(campaign.recordings.iter().flat_map(|r| &r.stroke)) / 2.0,
     };
     let (low, high) = (runs.strokes[0] - half, runs.strokes[parts - 1] + half);
     let beyond = BEYOND * (high - low);

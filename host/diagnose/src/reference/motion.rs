@@ -1,15 +1,9 @@
 //! Settled rows of a run, and which way pressure or stroke moves.
 
+use pam_data::statistics::range;
 use std::collections::VecDeque;
 
 use super::criteria::{FAST_SHARE, FAST_WITHIN, FEWEST_SETTLED, SETTLE, TURN, TURN_HOLD};
-
-/// Largest minus smallest value; zero for none.
-pub(super) fn range(values: &[f64]) -> f64 {
-    let (low, high) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    if high > low { high - low } else { 0.0 }
-}
 
 /// Rows long enough after the last fast move of the pressure; all rows where too few are.
 pub(super) fn settled(time: &[f64], pressure: &[f64]) -> Vec<bool> {

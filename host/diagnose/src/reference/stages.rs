@@ -2,6 +2,7 @@
 
 use pam_data::recording::motion::{Hold, Motion};
 use pam_data::recording::{Campaign, Recording};
+use pam_data::statistics::range;
 
 use super::criteria::{HELD, REPORT_REGULATED, STAGES_FEWEST_ROWS, STAGES_SHARE};
 
@@ -19,11 +20,6 @@ pub(super) fn parted(campaign: &Campaign) -> Campaign {
 fn stages(recording: &Recording) -> Option<Vec<Recording>> {
     let motion = Motion::of(recording);
     let largest = recording.pressure.iter().fold(0.0_f64, |m, p| m.max(p.abs()));
-    let range = |values: &[f64]| {
-        let (low, high) =
-            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-        high - low
-    };
     let sweeps = |hold: &&Hold| {
         let rows = hold.start..hold.end + 1;
         rows.len() >= STAGES_FEWEST_ROWS

@@ -11,7 +11,7 @@ use super::shapes::{Change, Class};
 use super::strokes::{Band, Key, bands, ends, levels};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
-use pam_data::statistics::slope;
+use pam_data::statistics::{extremes, slope};
 
 /// What repeats between campaigns of strokes: shares of the largest force, or of friction. By principle; reshaped once after a first run
 /// on the cylinder's recordings (friction as a share of friction, not of force).
@@ -160,9 +160,7 @@ fn covariance(
 ) -> DMatrix<f64> {
     let r: &StrokeRepeats = &STROKE_REPEATS;
     let n = keys.len();
-    let (low, high) = before
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), b| (l.min(b.stroke), h.max(b.stroke)));
+    let (low, high) = extremes(before.iter().map(|b| b.stroke));
     let span = (high - low).max(f64::MIN_POSITIVE);
     let friction: Vec<f64> = (0..n)
         .map(|i| {

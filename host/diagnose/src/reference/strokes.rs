@@ -6,10 +6,11 @@ use super::criteria::{
     LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKES_ENDS, STROKES_FEWEST_ROWS, STROKES_RUN_IN,
     STROKES_SPEED_OVER, TURN,
 };
-use super::motion::{range, turning};
+use super::motion::turning;
 use super::surface::bin;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Recording};
+use pam_data::statistics::range;
 
 /// Means of one stroke in one part of it.
 #[derive(Debug, Clone, Copy)]

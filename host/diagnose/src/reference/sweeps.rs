@@ -3,6 +3,7 @@
 use super::runs::{Mounted, Run, Runs};
 use pam_data::error::Result;
 use pam_data::recording::Campaign;
+use pam_data::statistics::extremes;
 
 /// One run at a held length.
 pub(crate) struct Sweep {
@@ -20,7 +21,7 @@ impl Sweep {
 
     /// Lowest and highest pressure of the settled rows, Pa.
     pub(crate) fn pressures(&self) -> (f64, f64) {
-        self.settled().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (p, ..)| (l.min(p), h.max(p)))
+        extremes(self.settled().map(|(p, ..)| p))
     }
 }
 

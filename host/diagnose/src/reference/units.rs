@@ -2,9 +2,9 @@
 
 use super::answer::Remark;
 use super::criteria::{FORCE_RATIO, UNIT_FAR, UNIT_NEAR};
-use super::motion::range;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
+use pam_data::statistics::range;
 
 /// Factors between units that are often confused.
 const FACTORS: [(f64, &str); 8] = [

@@ -9,10 +9,10 @@ use pam_fit::table_file::TableFile;
 
 use super::answer::{ChangeReport, Changed};
 use super::criteria::{UPDATE_COVERED, UPDATE_LAWS, UPDATE_LEVELS};
-use super::motion::range;
 use super::runs::mountings;
 use super::shapes::{Change, Class};
 use super::strokes::levels;
+use pam_data::statistics::range;
 
 /// Whether recordings reach over what the table was tested at, so that a table can be fitted to them.
 pub(super) fn covers(after: &Campaign, table: &MuscleTable) -> bool {

@@ -4,6 +4,7 @@ use crate::criteria::rows::{
     FLANK_STEP, NEGLIGIBLE_ERROR, NO_LOAD, SIMULTANEITY, SPIKE_CHANGE, SPIKE_NOISE, SPIKE_RANGE,
 };
 use pam_data::recording::{Campaign, usual_change, white_noise};
+use pam_data::statistics::extremes;
 use pam_fit::numerics::median;
 use pam_fit::{Clip, clip};
 
@@ -12,7 +13,7 @@ use pam_fit::{Clip, clip};
 pub(super) fn spikes(series: &[f64]) -> Vec<bool> {
     let n = series.len();
     let noise = white_noise(series);
-    let (lo, hi) = series.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (lo, hi) = extremes(series);
     let limit = (SPIKE_NOISE * noise).max(SPIKE_RANGE * (hi - lo));
     (0..n)
         .map(|i| {

@@ -1,5 +1,6 @@
 //! The table of a check: columns by name, in SI units.
 
+use pam_data::statistics::extremes;
 use std::path::{Path, PathBuf};
 
 use pam_data::error::{DataCode, Error, Result};
@@ -149,8 +150,7 @@ pub(super) fn stays(of: &[&[f64]]) -> Vec<usize> {
     let near: Vec<f64> = of
         .iter()
         .map(|c| {
-            let (low, high) =
-                c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            let (low, high) = extremes(c.iter());
             0.01 * (high - low)
         })
         .collect();

@@ -1,6 +1,7 @@
 //! Which points a fit may use, and why it excludes others. Every excluded point is counted and reported.
 
 use pam_data::recording::Campaign;
+use pam_data::statistics::extremes;
 
 use super::points::Points;
 
@@ -102,8 +103,7 @@ impl Screen {
 pub fn clip(campaign: &Campaign) -> (Option<Clip>, Option<Clip>) {
     let readings = || campaign.recordings.iter().filter_map(|r| r.force.as_deref()).flatten().copied();
     let count = |value: f64| readings().filter(|f| *f == value).count();
-    let (low, high) =
-        readings().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), f| (low.min(f), high.max(f)));
+    let (low, high) = extremes(readings());
     let ends = |value: f64, side: f64| {
         let rows = count(value);
         if rows < 30.max(campaign.samples() / 300) {

@@ -7,6 +7,7 @@
 //! `w ≤ 1` shares what a half-stroke can determine among its cells. The scales of the muscles sum to zero: their mean is in the surface.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use pam_data::statistics::extremes;
 
 use super::cells::{Cell, StockCells};
 use super::criteria::{
@@ -144,13 +145,7 @@ impl<'a> Search<'a> {
         if lengths.len() < 2 || !(cells.largest > 0.0) {
             return None;
         }
-        let range = |of: &dyn Fn(&Cell) -> f64| {
-            cells
-                .list
-                .iter()
-                .map(of)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
-        };
+        let range = |of: &dyn Fn(&Cell) -> f64| extremes(cells.list.iter().map(of));
         let contraction = range(&|c| cells.contraction(c));
         // Lengths that are corrected reach a little beyond the measured ones.
         let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);

@@ -4,6 +4,7 @@ use super::super::{Axis, Colour, Figure, Mark, Panel};
 use super::loads::{PANELS, broken};
 use super::models::{DRAWN, within_reach};
 use super::view::{Banded, View};
+use pam_data::statistics::extremes;
 use pam_fit::{ChunkError, MidPoint};
 
 /// Pressures along a curve of the table.
@@ -26,9 +27,7 @@ fn shown(view: &View<'_>) -> Vec<usize> {
 /// The pressures tested at one length, evenly spaced, Pa.
 fn pressures(view: &View<'_>, length: usize) -> Vec<f64> {
     let of = (0..view.points().len()).filter(|i| view.length_of(view.points()[*i].stroke) == length);
-    let (low, high) = of
-        .map(|i| view.points()[i].pressure)
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    let (low, high) = extremes(of.map(|i| view.points()[i].pressure));
     if !(low < high) {
         return Vec::new();
     }

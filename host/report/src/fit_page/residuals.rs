@@ -2,6 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed, residual_table};
 use super::view::View;
+use pam_data::statistics::extremes;
 
 pub(super) fn section(view: &View<'_>) -> Section {
     let mut section = Section::new("Residuals");
@@ -23,7 +24,7 @@ fn axis() -> Axis {
 
 /// Mean of the residual in bins along a coordinate, with at least a few points each.
 fn trend(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = extremes(x);
     if !(low < high) {
         return (Vec::new(), Vec::new());
     }

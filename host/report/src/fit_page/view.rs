@@ -1,6 +1,7 @@
 //! What the figures of a fit share: points with their residuals, and how tested pressures are called and coloured.
 
 use model_core::units::{Length, Pressure};
+use pam_data::statistics::extremes;
 
 use super::super::{Colour, fixed, significant};
 use pam_data::recording::Campaign;
@@ -166,7 +167,7 @@ impl<'a> View<'a> {
     pub fn strokes(&self, group: usize, count: usize) -> Vec<f64> {
         let of =
             (0..self.points().len()).filter(|i| self.group(*i) == group).map(|i| self.points()[i].stroke);
-        let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let (low, high) = extremes(of);
         if !(low < high) {
             return if low.is_finite() { vec![low] } else { Vec::new() };
         }

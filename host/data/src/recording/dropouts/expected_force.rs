@@ -6,7 +6,7 @@ use super::steps::Stretch;
 use crate::recording::force_surface::{ForceSurface, TERMS};
 use crate::recording::spikes::spikes;
 use crate::recording::{Campaign, Recording, white_noise};
-use crate::statistics::{median, quantile};
+use crate::statistics::{extremes, median, quantile};
 
 /// Rows that the surface is fitted to.
 const ROWS: usize = 20_000;
@@ -93,9 +93,7 @@ impl ExpectedForce {
         if rows.len() < 5 * TERMS {
             return None;
         }
-        let bounds = |k: usize| {
-            rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[k]), h.max(r[k])))
-        };
+        let bounds = |k: usize| extremes(rows.iter().map(|r| r[k]));
         let ((lowest, highest), stroke) = (bounds(0), bounds(1));
         let mut expected = Self {
             surface: ForceSurface::default(),

@@ -6,6 +6,7 @@ use super::sample::SampleColumn;
 use crate::date::{DateOrder, time_stamp_in};
 use crate::recording::line::is_remark;
 use crate::recording::thousands::{self, SEPARATORS};
+use crate::statistics::extremes;
 
 /// Signs that remarks begin with, beside the number sign; none begins a number.
 const REMARKS: &[u8] = b"%;!'/*";
@@ -106,8 +107,7 @@ fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, 
     let span = |order: DateOrder| {
         let present = cells.iter().filter(|c| !is_missing(c));
         let seconds: Option<Vec<f64>> = present.map(|c| time_stamp_in(c, order)).collect();
-        let range =
-            seconds?.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let range = extremes(&seconds?);
         Some(range.1 - range.0)
     };
     let (order, reason) = match (span(DateOrder::MonthFirst), span(DateOrder::DayFirst)) {

@@ -20,7 +20,7 @@ use crate::recording::source;
 use crate::recording::time_of_day;
 #[cfg(feature = "excel")]
 use crate::recording::workbook;
-use crate::statistics::quantile;
+use crate::statistics::{extremes, quantile};
 
 /// Bytes of a text that are looked at: some hundred thousand rows.
 const LOOKED_AT: u64 = 32 << 20;
@@ -131,7 +131,7 @@ impl SampleColumn {
 
     /// The least and the greatest number.
     pub(super) fn range(&self) -> (f64, f64) {
-        self.values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+        extremes(self.values())
     }
 }
 

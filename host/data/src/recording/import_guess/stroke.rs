@@ -5,6 +5,7 @@ use super::sample::{Sample, SampleColumn};
 use super::{Guess, GuessedColumn, Note, roles, values};
 use crate::recording::{Quantity, columns};
 use crate::short_number::short;
+use crate::statistics::extremes;
 
 /// A correlation of force with displacement at equal pressure from which the sign of the displacement is taken as shown. Uncorrelated
 /// readings of two independent slow movements rarely reach 0.8, and a force that falls with the stroke exceeds it.
@@ -56,7 +57,7 @@ fn held(header: &str, own: Range, si: f64, others: &Others<'_>) -> Option<String
     // The file that moves most decides: at a low pressure a muscle moves by little.
     let within = files.iter().map(|r| r.width).fold(0.0, f64::max);
     let middles = files.iter().map(|r| 0.5 * (r.low + r.high));
-    let (low, high) = middles.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+    let (low, high) = extremes(middles);
     let apart = high - low > APART * within;
     if !(within <= HELD * low.abs().max(high.abs()) || within * si <= columns::HELD || apart) {
         return None;

@@ -4,6 +4,7 @@ use super::others::Range;
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
 use crate::short_number::short;
+use crate::statistics::extremes;
 
 /// Gauge pressures of pneumatic muscles, Pa: from the threshold of a thin bladder to the compressed air of a building.
 pub(super) const PRESSURES: (f64, f64) = (100e3, 1e6);
@@ -130,7 +131,7 @@ pub(super) fn is_varied(pressure: &[f64]) -> bool {
     /// A regulator's droop is less than this share of the highest pressure.
     const VARIED: f64 = 0.5;
     let finite = pressure.iter().copied().filter(|p| p.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    let (low, high) = extremes(finite);
     high - low > VARIED * low.abs().max(high.abs())
 }
 

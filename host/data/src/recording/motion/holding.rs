@@ -7,9 +7,10 @@ use super::criteria::{
     HOLD_REACH, HOLD_SAMPLES, HOLD_TIME, LEVEL_SAMPLES, LONG_HOLD_SHARE, LONG_HOLD_TIME, PACE_PARTS,
     PACE_SAMPLES, SMALL_STROKE,
 };
-use super::scale::{Scale, range};
+use super::scale::Scale;
 use super::turning::Leg;
 use crate::statistics::median;
+use crate::statistics::range;
 
 /// A stretch of samples at held length, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]

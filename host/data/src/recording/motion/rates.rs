@@ -6,8 +6,9 @@ use super::criteria::{
     ACCELERATION_PRECISION, PRESSURE_RANGE_NOISE, PRESSURE_TIME, RATE_HALF_SAMPLES, RATE_SAMPLES,
     SPEED_PRECISION,
 };
-use super::scale::{moving_mean, range};
+use super::scale::moving_mean;
 use super::{Motion, Recording};
+use crate::statistics::range;
 
 /// Smoothed rates of a recording, one value per sample.
 #[derive(Debug, Clone, PartialEq, Default)]

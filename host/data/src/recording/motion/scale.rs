@@ -7,7 +7,7 @@ use super::criteria::{
     RIPPLE_RAISE, RIPPLE_RAISES, RIPPLE_SMALL, RIPPLE_STROKES, SMOOTHING_MOST, SMOOTHING_PART,
 };
 use super::turning::{Leg, legs};
-use crate::statistics::median;
+use crate::statistics::{median, range};
 
 /// The scale of a column's noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,13 +45,6 @@ fn coloured_noise(column: &[f64]) -> f64 {
     }
     // A converter's steps are noise too, even where neighbours are mostly equal.
     noise.max(quantum(column).min(QUANTUM_SHARE * range(column)) / 12f64.sqrt())
-}
-
-/// Largest minus smallest.
-pub(super) fn range(column: &[f64]) -> f64 {
-    let (low, high) =
-        column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-    (high - low).max(0.0)
 }
 
 /// How many standard deviations `n` samples of noise spread over, with a margin: twice the expected largest of n, plus one.

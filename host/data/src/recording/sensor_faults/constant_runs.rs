@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual};
-use crate::statistics::quantile;
+use crate::statistics::{extremes, quantile};
 
 /// Shorter runs are left to the outliers of the fit.
 const SHORTEST: usize = 10;
@@ -38,7 +38,7 @@ pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual, repeats: &R
     for channel in Channel::ALL {
         let column = channel.of(r);
         let habit = repeats.of_others(index, channel);
-        let (low, high) = ends(column);
+        let (low, high) = extremes(column);
         // A column that is always constant, such as a held length, says nothing by being so.
         if habit.equal > ALWAYS {
             continue;
@@ -191,15 +191,11 @@ fn held_scale(points: &[(f64, f64)]) -> f64 {
     scale.clamp(HELD_SCALE.0, HELD_SCALE.1)
 }
 
-fn ends(column: &[f64]) -> (f64, f64) {
-    column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
-}
-
 /// Rows at the largest force of a recording that other recordings exceed: the force sensor, or the range that was set for it, ends
 /// there. A sensor that ends at one value in all recordings is found by the fit.
 fn saturated_force(r: &Recording, index: usize, usual: &Usual, largest: f64) -> Vec<SensorFault> {
     let Some(force) = r.force.as_deref() else { return Vec::new() };
-    let (_, high) = ends(force);
+    let (_, high) = extremes(force);
     let at: Vec<usize> = (0..force.len()).filter(|i| force[*i] == high).collect();
     let next = force.iter().copied().filter(|f| *f < high).fold(f64::NEG_INFINITY, f64::max);
     let neighbours = force.iter().filter(|f| **f == next).count();

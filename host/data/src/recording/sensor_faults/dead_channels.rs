@@ -1,7 +1,7 @@
 //! Sensors that read one value through a whole recording, which the other readings exclude.
 
 use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual, stride, thinned};
-use crate::statistics::quantile;
+use crate::statistics::{extremes, quantile};
 
 /// A dead sensor's readings stay within this share of the campaign's range of the column: its noise, or the drift of an amplifier.
 const DEAD: f64 = 0.02;
@@ -30,13 +30,9 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
     let pulling = |(recording, r): &(usize, &Recording)| {
         !skipped[*recording] && r.force.is_some() && !r.is_empty() && !is_dead(r, Channel::Force, usual)
     };
-    let (low, high) = campaign
-        .recordings
-        .iter()
-        .enumerate()
-        .filter(pulling)
-        .flat_map(|(_, r)| thinned(&r.stroke))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let (low, high) = extremes(
+        campaign.recordings.iter().enumerate().filter(pulling).flat_map(|(_, r)| thinned(&r.stroke)),
+    );
     let compared = |r: &Recording| {
         let mut strokes: Vec<f64> = thinned(&r.stroke).collect();
         (low..=high).contains(&quantile(&mut strokes, 0.5))

@@ -6,6 +6,7 @@
 //! force comes and goes as fast as in the rows beside, or with a stroke or pressure that steps away and back, too. Nor is friction one that
 //! turns with the stroke at both ends, or the turn of a fast stroke a drop-out of the stroke. A step over a pause of the clock is none.
 
+use crate::statistics::extremes;
 use std::cell::LazyCell;
 use std::ops::Range;
 
@@ -134,9 +135,7 @@ fn rests(column: &[f64], rows: &Range<usize>) -> bool {
 fn is_unfelt(r: &Recording, rows: Range<usize>, usual: &Usual) -> bool {
     let made = (usual.expected.at(r, rows.start) - usual.expected.at(r, rows.start - 1)).abs();
     let force = r.force.as_deref().unwrap_or(&[]);
-    let (low, high) = force[rows.start - 1..=rows.end]
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), f| (l.min(*f), h.max(*f)));
+    let (low, high) = extremes(&force[rows.start - 1..=rows.end]);
     made > UNFELT.0 * usual.spans[2] && high - low <= UNFELT.1 * made
 }
 

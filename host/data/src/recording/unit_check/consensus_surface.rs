@@ -3,7 +3,7 @@
 use super::mistake::{Mistake, mistakes};
 use super::{InconsistentRecording, LEAST_ROWS, Sample};
 use crate::recording::force_surface::{ForceSurface, TERMS};
-use crate::statistics::{median, ranked};
+use crate::statistics::{extremes, median, ranked};
 
 /// A muscle counts as pulling above this share of the campaign's usual largest force.
 const PULLS: f64 = 0.05;
@@ -195,7 +195,7 @@ impl ConsensusSurface {
         let place = |row: &Row| self.scaled(row[0], row[1]);
         let range = |k: usize| {
             let ends = residuals.iter().map(|(row, _)| place(row)[k]);
-            let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+            let (low, high) = extremes(ends);
             high - low
         };
         let along = usize::from(range(1) > range(0));

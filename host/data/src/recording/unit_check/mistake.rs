@@ -2,6 +2,7 @@
 
 use super::Row;
 use crate::recording::Recording;
+use crate::statistics::extremes;
 
 /// The column with a mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -146,8 +147,7 @@ pub(super) fn mistakes(rows: &[Row]) -> impl Iterator<Item = Mistake> {
             [*ratio, 1.0 / ratio].map(|factor| Mistake { column, wrong: MistakeKind::Unit(factor, units) })
         })
     };
-    let (low, high) =
-        rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), r| (l.min(r[1]), h.max(r[1])));
+    let (low, high) = extremes(rows.iter().map(|r| r[1]));
     let shifted = [
         Mistake { column: Column::Stroke, wrong: MistakeKind::Sign },
         Mistake { column: Column::Force, wrong: MistakeKind::Sign },
