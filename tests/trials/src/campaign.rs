@@ -64,6 +64,9 @@ pub struct Campaigns {
     /// Only muscles in which this is hidden, once for each name; with `--development`.
     #[arg(long, requires = "development")]
     hidden: Vec<String>,
+    /// Write the recordings and checks of every campaign to a folder of their own here, too, for `host diagnose`.
+    #[arg(long, value_name = "FOLDER")]
+    keep: Option<PathBuf>,
     /// Begin no further muscle after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
@@ -194,7 +197,7 @@ pub fn run(what: &Campaigns) -> Result<(), Box<dyn Error>> {
             return Ok(known);
         }
         let bench_s = if what.short { SHORT_BENCH_S } else { BENCH_S };
-        let trial = one(spec, known, &left, bench_s, !what.short)?;
+        let trial = one(spec, known, &left, bench_s, what)?;
         let text = serde_json::to_string_pretty(&trial).map_err(|e| e.to_string())?;
         std::fs::write(&path, text).map_err(|e| e.to_string())?;
         progress.one();
@@ -235,15 +238,22 @@ fn one(
     known: Option<Trial>,
     methods: &[Method],
     bench_s: f64,
-    with_errors: bool,
+    what: &Campaigns,
 ) -> Result<Trial, String> {
     let made = crate::generate::make(spec, &crate::residuals::Residuals::read(std::path::Path::new("")));
     let (mut said, mut errors) = known.map_or_else(Default::default, |k| (k.said, k.errors));
-    if spec.stratum == Stratum::NullClean && with_errors && errors.is_empty() {
+    if spec.stratum == Stratum::NullClean && !what.short && errors.is_empty() {
         errors = table_error::after(spec, &made.truth.bench)?;
     }
     for method in methods {
         let recorded = methods::record(*method, spec, &made, bench_s)?;
+        if let Some(folder) = &what.keep {
+            methods::keep(
+                &folder.join(format!("{:04}-{method:?}", spec.id).to_lowercase()),
+                &made,
+                &recorded,
+            )?;
+        }
         said.push(methods::ask(*method, &made, &recorded)?);
     }
     let truth = made.truth.effects.iter().map(|e| e.name.clone()).collect();

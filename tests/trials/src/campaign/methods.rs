@@ -22,7 +22,7 @@ use virtual_bench::bench::Bench;
 use virtual_bench::campaigns;
 use virtual_bench::muscle::Muscle;
 use virtual_bench::protocol::Protocol;
-use virtual_bench::recording::Row;
+use virtual_bench::recording::{Columns, Recording as File, Row};
 use virtual_bench::rng::Rng;
 
 /// A way to record.
@@ -137,6 +137,32 @@ pub fn ask(method: Method, made: &Made, recorded: &Recorded) -> Result<Said, Str
         ended: recorded.ended.clone(),
         steps: recorded.recordings.iter().map(|r| r.name.clone()).collect(),
     })
+}
+
+/// Writes what was recorded, so that it can be diagnosed by hand.
+pub fn keep(folder: &Path, made: &Made, recorded: &Recorded) -> Result<(), String> {
+    let mut files = vec![("muscle.toml".to_owned(), made.description.clone())];
+    for (number, r) in recorded.recordings.iter().enumerate() {
+        let force = r.force.as_deref().unwrap_or(&[]);
+        let rows = (0..r.len()).map(|i| Row {
+            time: r.time[i],
+            pressure: r.pressure[i],
+            stroke: r.stroke[i],
+            force: force.get(i).copied().unwrap_or(f64::NAN),
+            ..Row::default()
+        });
+        let file = File { name: String::new(), rows: rows.collect() };
+        files.push((format!("{number:02}_{}.csv", r.name), file.csv(Columns::default())));
+    }
+    std::fs::create_dir_all(folder.join("checks")).map_err(|e| e.to_string())?;
+    for (name, text) in files {
+        std::fs::write(folder.join(name), text).map_err(|e| e.to_string())?;
+    }
+    for check in &recorded.checks {
+        let name = check.file_name().unwrap_or_default();
+        std::fs::copy(check, folder.join("checks").join(name)).map_err(|e| e.to_string())?;
+    }
+    Ok(())
 }
 
 fn rig() -> Rig {
