@@ -30,8 +30,9 @@ fn rows(folder: &Path) -> Vec<String> {
         .filter(|p| {
             let name = p.file_name().unwrap().to_string_lossy().into_owned();
             // Checks of the bench have a clock of their own.
-            let check =
-                ["dead_weights", "rigid_bar", "gauge_check", "weighing"].iter().any(|c| name.contains(c));
+            let check = ["dead_weights", "rigid_bar", "gauge_check", "weighing", "closed_valve"]
+                .iter()
+                .any(|c| name.contains(c));
             name.contains(".csv") && !check
         })
         .collect();

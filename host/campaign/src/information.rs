@@ -158,7 +158,7 @@ impl<'a> Design<'a> {
     }
 
     fn of_check(&self, check: CheckKind) -> Gain {
-        let settles = |law: Candidate| law.traits().check.and_then(CheckKind::of) == Some(check);
+        let settles = |law: Candidate| check.settles(law);
         let mut gain = Gain::default();
         for set in self.known.sets {
             let apart = |i: usize, j: usize| {
@@ -213,8 +213,7 @@ impl<'a> Design<'a> {
         let (m, left) = (self.table.len(), &view.left);
         let size = (EFFECT_SIZE * self.known.blocked).powi(2);
         let settled = |law: Candidate| {
-            let check = law.traits().check.and_then(CheckKind::of);
-            self.in_sets(law) || check.is_some_and(|c| self.known.checked.contains(&c) || more.contains(&c))
+            self.in_sets(law) || self.known.checked.iter().chain(more).any(|c| c.settles(law))
         };
         let open: Vec<usize> =
             (0..self.library.laws.len()).filter(|e| !settled(self.library.laws[*e].law)).collect();
@@ -244,9 +243,7 @@ impl<'a> Design<'a> {
     /// Squared distances of each effect of a set from each other one, whose size and shape are free.
     fn distances(&self, view: &View, seen: &Seen<'_>, set: usize) -> DMatrix<f64> {
         let effects = &self.known.sets[set];
-        let checked = |h: &Hypothesis| {
-            h.law.traits().check.and_then(CheckKind::of).is_some_and(|c| self.known.checked.contains(&c))
-        };
+        let checked = |h: &Hypothesis| self.known.checked.iter().any(|c| c.settles(h.law));
         let m = self.table.len();
         let ridge = 1.0 / (self.known.blocked * self.known.blocked);
         let shapes: Vec<Vec<Vec<usize>>> = effects

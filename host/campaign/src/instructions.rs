@@ -154,6 +154,11 @@ fn of_check(check: CheckKind) -> Vec<String> {
              twice each, each for some seconds.",
             "Record time_, force_ and attached, which is 1 or 0.",
         ],
+        CheckKind::ClosedValve => &[
+            "Hold the muscle at rest length at the highest pressure, and wait until pressure and force are steady.",
+            "Close the valve between supply and gauge for half a minute, and open it again: at least three times.",
+            "Record time_, pressure_ and valve_closed, which is 1 or 0.",
+        ],
     };
     lines.iter().map(|l| (*l).to_owned()).collect()
 }

@@ -74,7 +74,7 @@ pub struct Rig {
     /// The hanging weight, N.
     #[serde(rename = "weight_N", skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
-    /// Whether checks of the bench (dead weights, rigid bar, reference gauge) can be made on request.
+    /// Whether checks of the bench (dead weights, rigid bar, reference gauge, weighing, closed valve) can be made on request.
     #[serde(default)]
     pub checks: bool,
 }

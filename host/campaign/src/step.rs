@@ -1,6 +1,7 @@
 //! The menu of steps: what can be done with the muscle, as plain data.
 
-use model_core::effects::BenchCheck;
+use pam_fit::bench::Candidate;
+use pam_fit::checks::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::course::{Course, Segment, VENT_S};
@@ -91,33 +92,38 @@ pub enum CheckKind {
     ReferenceGauge,
     /// The load cell with and without muscle and fittings.
     Weighing,
+    /// The muscle under pressure behind a closed valve.
+    ClosedValve,
 }
 
 impl CheckKind {
     /// All.
-    pub const ALL: [Self; 4] = [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge, Self::Weighing];
-
-    /// The check of an effect's traits, where it is one of these.
-    #[must_use]
-    pub const fn of(check: BenchCheck) -> Option<Self> {
-        match check {
-            BenchCheck::DeadWeights => Some(Self::DeadWeights),
-            BenchCheck::RigidBar => Some(Self::RigidBar),
-            BenchCheck::ReferenceGauge => Some(Self::ReferenceGauge),
-            BenchCheck::Weighing => Some(Self::Weighing),
-            _ => None,
-        }
-    }
+    pub const ALL: [Self; 5] =
+        [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge, Self::Weighing, Self::ClosedValve];
 
     /// The kind of a check that was made.
     #[must_use]
-    pub const fn of_made(kind: pam_fit::checks::Kind) -> Self {
+    pub const fn of_made(kind: Kind) -> Self {
         match kind {
-            pam_fit::checks::Kind::DeadWeights => Self::DeadWeights,
-            pam_fit::checks::Kind::RigidBar => Self::RigidBar,
-            pam_fit::checks::Kind::ReferenceGauge => Self::ReferenceGauge,
-            pam_fit::checks::Kind::Weighing => Self::Weighing,
+            Kind::DeadWeights => Self::DeadWeights,
+            Kind::RigidBar => Self::RigidBar,
+            Kind::ReferenceGauge => Self::ReferenceGauge,
+            Kind::Weighing => Self::Weighing,
+            Kind::ClosedValve => Self::ClosedValve,
         }
+    }
+
+    /// Whether the check tells what an effect is, so that no motion needs to.
+    #[must_use]
+    pub fn settles(self, effect: Candidate) -> bool {
+        let kind = match self {
+            Self::DeadWeights => Kind::DeadWeights,
+            Self::RigidBar => Kind::RigidBar,
+            Self::ReferenceGauge => Kind::ReferenceGauge,
+            Self::Weighing => Kind::Weighing,
+            Self::ClosedValve => Kind::ClosedValve,
+        };
+        kind.settles(effect)
     }
 
     /// Name of its file, without extension.
@@ -128,6 +134,7 @@ impl CheckKind {
             Self::RigidBar => "rigid_bar",
             Self::ReferenceGauge => "gauge_check",
             Self::Weighing => "weighing",
+            Self::ClosedValve => "closed_valve",
         }
     }
 
@@ -139,6 +146,7 @@ impl CheckKind {
             Self::RigidBar => 120.0,
             Self::ReferenceGauge => 60.0,
             Self::Weighing => 48.0,
+            Self::ClosedValve => 72.0,
         }
     }
 }
@@ -199,6 +207,7 @@ impl Step {
                 CheckKind::RigidBar => "a check of the frame with a rigid bar".into(),
                 CheckKind::ReferenceGauge => "a check of the pressure sensor with a reference gauge".into(),
                 CheckKind::Weighing => "a check of the load cell with and without muscle and fittings".into(),
+                CheckKind::ClosedValve => "a check of the muscle for a leak behind a closed valve".into(),
             },
         }
     }

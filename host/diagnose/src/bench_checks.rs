@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use model_core::braid::Braid;
-use model_core::effects::MEMORY;
+use model_core::effects::{EffectName, MEMORY};
 
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::Candidate;
@@ -18,7 +18,10 @@ use super::verdict::{
 use pam_data::error::Result;
 use pam_data::recording::Campaign;
 use pam_fit::bench::{BenchName, Candidate as Law};
-use pam_fit::checks::{self, Checks, Measured};
+use pam_fit::checks::{self, Checks, Loss, Measured};
+
+/// The effect that a closed valve shows.
+const LEAK: Law = Law::Muscle(EffectName::Leak);
 
 /// A fault that was checked, and how large it is in these recordings.
 struct Judged {
@@ -29,10 +32,31 @@ struct Judged {
     at_most: f64,
 }
 
+/// What a closed valve says of a leak.
+struct LeakCheck {
+    loss: Loss,
+    /// The largest force that the leak may take at any row, N.
+    at_most: f64,
+    finding: Leak,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Leak {
+    /// It cannot matter.
+    Absent,
+    /// It may matter.
+    Possible,
+    /// It matters, whatever the line.
+    Present,
+}
+
 /// What checks of the bench measured.
 pub(super) struct BenchChecks {
     named: Vec<Judged>,
     absent: Vec<Judged>,
+    /// Faults that a check shows, and that the recordings decide on.
+    likely: Vec<Measured>,
+    leak: Option<LeakCheck>,
     /// The recordings as they were read, with one bladder for all pressures; only where something is named.
     before: Option<(Rows, Baseline)>,
 }
@@ -40,13 +64,15 @@ pub(super) struct BenchChecks {
 impl BenchChecks {
     /// Compares what checks measured with the recordings.
     pub(super) fn of(checks: &Checks, campaign: &Campaign, braid: &Braid<f64>) -> Result<Self> {
-        let mut known = Self { named: Vec::new(), absent: Vec::new(), before: None };
+        let mut known =
+            Self { named: Vec::new(), absent: Vec::new(), likely: Vec::new(), leak: None, before: None };
         if checks.is_empty() {
             return Ok(known);
         }
         let (rows, fitted) = one_bladder(campaign, None, braid)?;
         let rows = baselines::linearised(&rows, &fitted);
         let blocked = rows.force.iter().copied().fold(0.0, f64::max);
+        let material = |force: f64| force >= MATERIAL_FAULT * blocked;
         for measured in checks.measured() {
             let peak = |parameters: &[f64]| {
                 let trace = Law::Bench(measured.fault).trace(rows.contexts(), parameters, &mut [0.0; MEMORY]);
@@ -64,13 +90,32 @@ impl BenchChecks {
                 peak: peak(&measured.parameters),
                 at_most: peak(&further),
             };
-            if !(judged.measured.is_sure() && judged.peak >= MATERIAL_FAULT * blocked) {
+            let sure = judged.measured.is_sure();
+            if !material(judged.peak) || !(sure || judged.measured.is_likely()) {
                 known.absent.push(judged);
-            } else if judged.measured.fault != BenchName::Backlash {
-                // A play cannot be removed from a reading: the recordings decide.
+            } else if sure && judged.measured.fault != BenchName::Backlash {
                 known.named.push(judged);
+            } else {
+                // The recordings decide where chance could still be the cause, and on a play, which cannot be removed from a reading.
+                known.likely.push(judged.measured);
             }
         }
+        known.leak = checks.loss().map(|loss| {
+            let (least, most) = loss.lost_part();
+            let pull = rows
+                .contexts()
+                .iter()
+                .map(|c| (c.pull_per_pressure() * c.pressure).abs())
+                .fold(0.0, f64::max);
+            let finding = if !material(most * pull) {
+                Leak::Absent
+            } else if material(least * pull) {
+                Leak::Present
+            } else {
+                Leak::Possible
+            };
+            LeakCheck { loss: loss.clone(), at_most: most * pull, finding }
+        });
         if !known.named.is_empty() {
             known.before = Some((rows, fitted));
         }
@@ -96,7 +141,15 @@ impl BenchChecks {
     /// An effect that the user gives as known is fitted even where a check found it immaterial.
     pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
         let is = |j: &Judged| candidate.is(Law::Bench(j.measured.fault));
-        self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && self.absent.iter().any(is))
+        let tight = candidate.is(LEAK) && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Absent);
+        let excluded = tight || self.absent.iter().any(is);
+        self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && excluded)
+    }
+
+    /// Whether a check shows an effect, and the recordings tell how large it is.
+    pub(super) fn shows(&self, candidate: &Candidate) -> bool {
+        let leak = candidate.is(LEAK) && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Present);
+        leak || self.likely.iter().any(|m| candidate.is(Law::Bench(m.fault)))
     }
 
     /// Enters the measured faults into the answer that was found without them, with the kind of its last baseline.
@@ -119,6 +172,29 @@ impl BenchChecks {
                 checked: true,
                 visible: 1.0,
             });
+        }
+        diagnosis.remarks.extend(
+            self.likely
+                .iter()
+                .map(|m| Remark::Measured { check: m.check.to_string(), value: m.words.to_string() }),
+        );
+        if let Some(l) = &self.leak {
+            if l.finding == Leak::Absent && !given.contains(&LEAK) {
+                diagnosis.considered.push(Considered {
+                    effect: LEAK.info().name.into(),
+                    gain: 0.0,
+                    why_not: WhyNot::Measured {
+                        check: l.loss.check.to_string(),
+                        value: l.loss.words.clone(),
+                    },
+                    hidden_up_to_N: Some(l.at_most),
+                    checked: true,
+                    visible: 1.0,
+                });
+            } else {
+                let (check, value) = (l.loss.check.to_string(), l.loss.words.clone());
+                diagnosis.remarks.push(Remark::Measured { check, value });
+            }
         }
         if !diagnosis.judged() {
             // The fault is known all the same; its share of these recordings is not.

@@ -62,11 +62,18 @@ pub(crate) struct Candidate {
     pub info: &'static Info,
     /// What is to be known of it beside its equations.
     pub traits: &'static Traits,
+    /// Whether a check of the bench shows that it is there.
+    pub shown_by_check: bool,
     /// The range of the recordings on the axes of shapes.
     span: Span,
 }
 
 impl Candidate {
+    /// The same; `shown` tells whether a check of the bench shows that it is there.
+    pub(crate) fn with_check(self, shown: bool) -> Self {
+        Self { shown_by_check: shown, ..self }
+    }
+
     /// Its name in the catalogue.
     pub(crate) fn name(&self) -> &'static str {
         self.info.name
@@ -215,7 +222,7 @@ pub(crate) fn library(rows: &Rows, added: &[Law]) -> Vec<Candidate> {
     let catalogue = bench::Candidate::all().map(Law::Catalogue);
     catalogue
         .chain(added.iter().copied())
-        .map(|law| Candidate { law, info: law.info(), traits: law.traits(), span })
+        .map(|law| Candidate { law, info: law.info(), traits: law.traits(), shown_by_check: false, span })
         .filter(|c| !matches!(c.traits.imitates, Some(Imitates::Deadband | Imitates::ElasticOrders)))
         .filter(|c| !c.traits.between_recordings)
         .collect()

@@ -171,7 +171,8 @@ fn select(
     remarks: &mut Vec<Remark>,
 ) -> SelectionResult {
     let everything = library(rows, &options.added()).into_iter();
-    let library: Vec<Candidate> = everything.filter(|c| !known.settles(c, &options.given)).collect();
+    let open = everything.filter(|c| !known.settles(c, &options.given));
+    let library: Vec<Candidate> = open.map(|c| c.with_check(known.shows(&c))).collect();
     let given: Vec<usize> =
         options.given.iter().filter_map(|law| library.iter().position(|c| c.is(*law))).collect();
     let (selection, held_out) = if options.given.is_empty() {

@@ -15,6 +15,7 @@ use super::criteria::selection::{
     FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MOST_COMPETITORS,
     MOST_EXCLUDED, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
 };
+use super::free_zero::fall_beside_free_zero;
 use super::likelihood::Scale;
 use super::linear::energy;
 use super::noise::{self, Noise};
@@ -135,7 +136,7 @@ impl<'a> ForwardSelection<'a> {
         if !self.is_sufficient(&best[at], p[at]) {
             return ControlFlow::Break(());
         }
-        let winner = self.best_within_known_range(&best[at], &best, &scorer);
+        let winner = self.best_known(&best[at], &best, &scorer);
         if let Some(memory) = self.memory_of_unknown_start(&winner) {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
@@ -146,7 +147,11 @@ impl<'a> ForwardSelection<'a> {
         }
         let beside = Kind::Soft(winner.prior);
         let metric = baselines::fit(&self.rows, beside, &[]);
-        let competitors = competitors(&winner, &best, self.library, &self.rows, &scorer, &metric.span);
+        let competitors = if self.library[winner.candidate].shown_by_check {
+            Vec::new()
+        } else {
+            competitors(&winner, &best, self.library, &self.rows, &scorer, &metric.span)
+        };
         let open: Vec<String> = competitors
             .iter()
             .filter(|r| r.1 > CONFUSABLE)
@@ -184,24 +189,22 @@ impl<'a> ForwardSelection<'a> {
         (!self.chosen.is_empty() || !shadow).then_some(at)
     }
 
-    /// The winner; or, where it explains the misfit only at the edge of what is known of it, the best that explains the same within what
-    /// is known. The winner has shown that there is something to explain: its score stays.
-    fn best_within_known_range(
-        &self,
-        winner: &CandidateFit,
-        best: &[CandidateFit],
-        scorer: &Scorer<'_>,
-    ) -> CandidateFit {
+    /// The winner; or the best that explains the same and that a check of the bench shows; or, where the winner explains the misfit only at
+    /// the edge of what is known of it, the best that explains the same within what is known. The winner has shown that there is something
+    /// to explain: its score stays.
+    fn best_known(&self, winner: &CandidateFit, best: &[CandidateFit], scorer: &Scorer<'_>) -> CandidateFit {
         let known = |t: &CandidateFit| t.is_within_known_range(&self.library[t.candidate]);
-        if known(winner) {
+        let shown = |t: &CandidateFit| self.library[t.candidate].shown_by_check;
+        let any_shown = best.iter().any(|t| shown(t) && self.is_eligible(t, scorer));
+        if shown(winner) || (known(winner) && !any_shown) {
             return winner.clone();
         }
         let metric = baselines::fit(&self.rows, Kind::Soft(winner.prior), &[]);
         let competitors = competitors(winner, best, self.library, &self.rows, scorer, &metric.span);
         let alike = |t: &CandidateFit| competitors.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
         best.iter()
-            .filter(|t| known(t) && alike(t) && self.is_eligible(t, scorer))
-            .max_by(|a, b| a.score.total_cmp(&b.score))
+            .filter(|t| (shown(t) || (known(t) && !known(winner))) && alike(t) && self.is_eligible(t, scorer))
+            .max_by(|a, b| shown(a).cmp(&shown(b)).then(a.score.total_cmp(&b.score)))
             .map_or_else(
                 || winner.clone(),
                 |t| CandidateFit { score: winner.score.max(t.score), ..t.clone() },
@@ -261,27 +264,10 @@ impl<'a> ForwardSelection<'a> {
         let beside = Kind::Soft(winner.prior);
         let chosen = self.chosen.iter().chain([&winner]).cloned().collect();
         let joint = refit(&self.rows, beside, chosen, self.library);
-        // The gain is that of a linear step; the joint refit has to keep a good part of it.
-        let kept = energy(&joint.base.residual) <= winner.before - KEPT_GAIN * winner.gain;
         // The new residual determines how many rows are independent: a drifting zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
         let left = noise::estimate(&joint.rows, &joint.base.residual, self.step);
-        let trace = candidate_fit::projected_trace(&winner, self.library, &joint.rows, &metric.span);
-        let residual = &joint.base.residual;
-        let independent = noise::independent_beside(&joint.rows, residual, left.memory, &trace, self.step)
-            .max(FEWEST_INDEPENDENT);
-        let score = winner.score * (independent / self.scale.independent).min(1.0);
-        let slow = self.library[winner.candidate].traits.slow;
-        let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
-        // What is impossible may have become so only beside the refitted model.
-        let possible = |f: &CandidateFit| self.library[f.candidate].is_consistent(&f.amplitudes, &f.shapes);
-        let refusal = if !kept {
-            Some(Refusal::LostInRefit)
-        } else if score < least {
-            Some(Refusal::SlowDrift)
-        } else {
-            (!joint.fits.iter().all(possible)).then_some(Refusal::ImpossibleInRefit)
-        };
+        let refusal = self.refusal(&winner, &metric, &joint, left.memory);
         if let Some(why) = refusal {
             // The effects before it stay as they were fitted without it.
             self.excluded.push(winner.candidate);
@@ -308,6 +294,35 @@ impl<'a> ForwardSelection<'a> {
         if self.chosen.len() > 1 {
             self.exchange();
         }
+    }
+
+    /// Why an effect cannot stay, after the joint refit that leaves a residual of this memory, s.
+    fn refusal(
+        &self,
+        winner: &CandidateFit,
+        metric: &Baseline,
+        joint: &JointFit,
+        memory: f64,
+    ) -> Option<Refusal> {
+        let residual = &joint.base.residual;
+        // The gain is that of a linear step; the joint refit has to keep a good part of it.
+        if energy(residual) > winner.before - KEPT_GAIN * winner.gain {
+            return Some(Refusal::LostInRefit);
+        }
+        let trace = candidate_fit::projected_trace(winner, self.library, &joint.rows, &metric.span);
+        let independent = noise::independent_beside(&joint.rows, residual, memory, &trace, self.step)
+            .max(FEWEST_INDEPENDENT);
+        let score = winner.score * (independent / self.scale.independent).min(1.0);
+        let slow = self.library[winner.candidate].traits.slow;
+        let least = if slow { LEAST_SCORE_ALONE } else { LEAST_SCORE };
+        let beside_zero =
+            || fall_beside_free_zero(&joint.rows, joint.base.kind, &joint.traces, memory, self.step);
+        if !(score >= least || winner.score >= least && beside_zero() >= least) {
+            return Some(Refusal::SlowDrift);
+        }
+        // What is impossible may have become so only beside the refitted model.
+        let possible = |f: &CandidateFit| self.library[f.candidate].is_consistent(&f.amplitudes, &f.shapes);
+        (!joint.fits.iter().all(possible)).then_some(Refusal::ImpossibleInRefit)
     }
 
     /// What a joint fit makes of the effects.

@@ -48,6 +48,7 @@ mod diagnosis;
 pub mod experiment;
 mod findings;
 mod forward_selection;
+mod free_zero;
 pub mod health;
 pub mod history;
 mod intervals;

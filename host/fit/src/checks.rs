@@ -1,10 +1,11 @@
-//! Checks of the bench without its muscle: each instrument against a reference.
+//! Checks of the bench: each instrument against a reference, and the muscle for a loss of air.
 //!
 //! ```text
 //! dead weights      F_read = (1 + γ) (W + c P) + o        known weights W on the cell, line vented and under pressure P
 //! rigid bar         x_read = x_bar − δ − F/K − b/2·sign F a bar in the muscle's place, pulled and pushed
 //! reference gauge   P_read = (1 + ν) P + q                a better gauge beside the bench's own
 //! weighing          F_read = a W + o                      the vented cell with (a = 1) and without (a = 0) muscle and fittings
+//! closed valve      dP/dt = −r P                          the muscle under pressure, its valve closed: does it lose air?
 //! ```
 //! Loops of a muscle hardly separate a gain error of the load cell from that of the pressure sensor, or the frame's compliance from
 //! that of the braid: the table absorbs more than nine tenths of such an error. A check of one minute with a weight measures it. The
@@ -18,7 +19,9 @@
 //! | rigid bar | `time_`, `displacement_`, `force_`, `reference_displacement_` |
 //! | reference gauge | `time_`, `pressure_`, `reference_pressure_` |
 //! | weighing | `time_`, `force_`, `attached`: 1 or 0 |
+//! | closed valve | `time_`, `pressure_`, `valve_closed`: 1 or 0 |
 
+mod closed_valve;
 mod dead_weights;
 mod gauge;
 mod rigid_bar;
@@ -27,11 +30,13 @@ mod weighing;
 
 use std::path::Path;
 
-use crate::bench::BenchName;
+use crate::bench::{BenchName, Candidate};
 use crate::numerics::student::{effective_freedom, half_width};
+use model_core::effects::EffectName;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Quantity};
 
+pub use closed_valve::Loss;
 use table::Table;
 
 /// A kind of check.
@@ -45,9 +50,26 @@ pub enum Kind {
     ReferenceGauge,
     /// The load cell with and without muscle and fittings.
     Weighing,
+    /// The muscle under pressure behind a closed valve.
+    ClosedValve,
 }
 
 impl Kind {
+    /// Whether the check tells what an effect of the catalogue is, so that recordings need not.
+    #[must_use]
+    pub fn settles(self, effect: Candidate) -> bool {
+        let of_bench = |names: &[BenchName]| names.iter().any(|n| effect == Candidate::Bench(*n));
+        match self {
+            Self::DeadWeights => of_bench(&[BenchName::ForceGain, BenchName::CrossTalk]),
+            Self::RigidBar => {
+                of_bench(&[BenchName::RigCompliance, BenchName::Backlash, BenchName::DisplacementOffset])
+            }
+            Self::ReferenceGauge => of_bench(&[BenchName::GaugeGain]),
+            Self::Weighing => of_bench(&[BenchName::Gravity]),
+            Self::ClosedValve => effect == Candidate::Muscle(EffectName::Leak),
+        }
+    }
+
     /// Which check a file is, by the column of its reference.
     ///
     /// # Errors
@@ -59,6 +81,9 @@ impl Kind {
     fn of_table(table: &Table) -> Result<Self> {
         if table.attached().is_ok() {
             return Ok(Self::Weighing);
+        }
+        if table.valve_closed().is_ok() {
+            return Ok(Self::ClosedValve);
         }
         let kinds = [
             (Quantity::Force, Self::DeadWeights),
@@ -91,9 +116,20 @@ impl Measured {
     /// Whether the check shows the fault beyond its own uncertainty: the first number that it varied represents all.
     #[must_use]
     pub fn is_sure(&self) -> bool {
+        self.exceeds(CHANCE)
+    }
+
+    /// Whether the 95 % interval of the fault excludes none.
+    #[must_use]
+    pub fn is_likely(&self) -> bool {
+        self.exceeds(CONFIDENCE_MISS)
+    }
+
+    /// Whether chance alone makes so large a value with less than a probability.
+    fn exceeds(&self, chance: f64) -> bool {
         let mut varied =
             self.parameters.iter().zip(&self.deviations).filter_map(|(v, std)| Some((v, (*std)?)));
-        varied.next().is_some_and(|(value, std)| value.abs() > half_width(CHANCE, self.freedom) * std)
+        varied.next().is_some_and(|(value, std)| value.abs() > half_width(chance, self.freedom) * std)
     }
 
     /// The largest and smallest value of a parameter that the check allows, as a distance from its value (95 %).
@@ -117,6 +153,7 @@ const CONFIDENCE_MISS: f64 = 0.05;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checks {
     measured: Vec<Measured>,
+    loss: Option<Loss>,
 }
 
 impl Checks {
@@ -134,6 +171,10 @@ impl Checks {
                 Kind::RigidBar => rigid_bar::measure(&table)?,
                 Kind::ReferenceGauge => gauge::measure(&table)?,
                 Kind::Weighing => weighing::measure(&table)?,
+                Kind::ClosedValve => {
+                    checks.loss = Some(closed_valve::measure(&table)?);
+                    continue;
+                }
             };
             for m in measured {
                 checks.measured.retain(|old| old.fault != m.fault);
@@ -149,10 +190,16 @@ impl Checks {
         &self.measured
     }
 
+    /// What a closed valve showed.
+    #[must_use]
+    pub fn loss(&self) -> Option<&Loss> {
+        self.loss.as_ref()
+    }
+
     /// Whether there are no checks.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.measured.is_empty()
+        self.measured.is_empty() && self.loss.is_none()
     }
 }
 

@@ -55,7 +55,7 @@ pub struct Arguments {
     /// A table whose error on the recordings is reported; by default one is fitted.
     #[arg(long, value_name = "T.pam")]
     table: Option<PathBuf>,
-    /// A check of the bench (dead weights, rigid bar, reference gauge, weighing). The recordings are corrected for what it measures.
+    /// A check of the bench (dead weights, rigid bar, reference gauge, weighing, closed valve). The recordings are corrected for what it measures.
     /// May be given more than once.
     #[arg(long, value_name = "CHECK.csv")]
     check: Vec<PathBuf>,

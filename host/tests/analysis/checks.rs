@@ -179,6 +179,31 @@ fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
     }
 }
 
+/// Loops hardly tell a leak from a friction that differs between the directions, or from a gauge that reads too much.
+#[test]
+fn a_closed_valve_says_whether_a_loss_of_pull_is_a_leak() {
+    let (mut leaking, tight) = (bench(), bench());
+    leaking.pneumatics.sensor_at_regulator = true;
+    leaking.pneumatics.leak = 0.05;
+    for bench in [leaking, tight] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let closed: Vec<PathBuf> =
+            files(&bench, &folder).into_iter().filter(|f| f.ends_with("closed_valve.csv")).collect();
+        let checks = Checks::read(&closed).expect("a check");
+        let answer = diagnosed(&bench, checks);
+        let named: Vec<&str> = answer.missing.iter().map(|m| m.effect.as_str()).collect();
+        if bench.pneumatics.leak > 0.0 {
+            assert_eq!(named, ["leak"]);
+            assert!(answer.missing[0].confusable_with.is_empty(), "{:?}", answer.missing[0].confusable_with);
+        } else {
+            assert!(named.is_empty(), "{named:?}");
+            let excluded = answer.considered.iter().find(|c| c.effect == "leak").expect("looked at");
+            assert!(pam_report::wording::why_not(excluded).contains("closed valve"));
+            assert!(excluded.hidden_up_to_N.is_some_and(|h| h < 0.0025 * answer.blocked_force_N));
+        }
+    }
+}
+
 /// Each stay at a weight is off by its own error, as a cell that creeps is: the rows of a stay repeat it.
 #[test]
 fn few_stays_do_not_make_a_sound_load_cell_faulty() {

@@ -1,8 +1,8 @@
-//! Checks of the bench without its muscle: dead weights on the load cell, a rigid bar in the muscle's place, a reference gauge, and the
-//! load cell with and without muscle and fittings.
+//! Checks of the bench: dead weights on the load cell, a rigid bar in the muscle's place, a reference gauge, the load cell with and
+//! without muscle and fittings, and the muscle behind a closed valve.
 //!
 //! They are what protocol C of the catalogue adds: each shows one instrument against something known, and so splits what loops
-//! of the muscle confuse (gain of cell and gauge, cross-talk, what the frame gives, play, weight in the load path).
+//! of the muscle confuse (gain of cell and gauge, cross-talk, what the frame gives, play, weight in the load path, leak).
 
 use crate::bench::BenchSpec;
 use crate::rig::RigState;
@@ -32,6 +32,7 @@ pub fn all(bench: &BenchSpec, force: f64, pressure: f64, clock: f64) -> Vec<Chec
         rigid_bar(bench, force, clock + 200.0),
         gauge(bench, pressure, clock + 400.0),
         weighing(bench, clock + 600.0),
+        closed_valve(bench, pressure, clock + 700.0),
     ]
 }
 
@@ -152,6 +153,37 @@ fn weighing(bench: &BenchSpec, clock: f64) -> Check {
     Check { name: "weighing", csv }
 }
 
+/// The muscle at rest length under pressure; a valve before its line closes three times for a while.
+fn closed_valve(bench: &BenchSpec, pressure: f64, clock: f64) -> Check {
+    let mut gauge = channel(bench, "pressure");
+    let air = &bench.pneumatics;
+    // What the line would fill in its time, the leak loses in so much longer.
+    let loss = air.leak / air.line.max(1e-5);
+    let mut csv = String::from("time_s,pressure_kPa,valve_closed\n");
+    let (mut t, mut inside) = (clock, pressure);
+    for closed in [false, true, false, true, false, true] {
+        if !closed {
+            inside = pressure;
+        }
+        let stay = if closed { 3.0 * STAY } else { STAY };
+        for i in 0..(stay * RATE) as u32 {
+            for _ in 0..WITHIN {
+                let dt = 1.0 / RATE / f64::from(WITHIN);
+                t += dt;
+                if closed {
+                    inside *= (-loss * dt).exp();
+                }
+                gauge.follow(dt, inside);
+            }
+            let p = gauge.sample(1.0 / RATE);
+            if closed || f64::from(i) >= RATE {
+                let _ = writeln!(csv, "{t:.3},{:.4},{}", p * 1e-3, u8::from(closed));
+            }
+        }
+    }
+    Check { name: "closed_valve", csv }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,5 +221,12 @@ mod tests {
         let give = slope(&columns(&all[1]), 2, 1);
         assert!((-1.0 / give / (200.0 * 1.02) - 1.0).abs() < 0.02, "{give}");
         assert!((slope(&columns(&all[2]), 2, 1) - 0.99).abs() < 1e-3);
+        // A leak of a hundredth of a line that fills the muscle in 4 ms.
+        let lowest = |bench: &BenchSpec| {
+            columns(&closed_valve(bench, 500e3, 0.0)).iter().map(|r| r[1]).fold(f64::INFINITY, f64::min)
+        };
+        assert!(lowest(&bench) > 490.0, "{}", lowest(&bench));
+        bench.pneumatics.leak = 0.01;
+        assert!(lowest(&bench) < 10.0, "{}", lowest(&bench));
     }
 }

@@ -28,8 +28,8 @@ impl Effect for Leak {
         source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge)
-        .check(BenchCheck::ReferenceGauge)
+    const TRAITS: Traits = Traits::shown_by(Experiment::ClosedValve)
+        .check(BenchCheck::ClosedValve)
         .loses_air()
         .changed(Changed::new(
             Class::Gain,

@@ -11,6 +11,8 @@ pub enum Experiment {
     Weighing,
     /// A reference gauge, vented and at three pressures.
     ReferenceGauge,
+    /// A closed valve between supply and muscle.
+    ClosedValve,
     /// Dead weights on the load cell, with and without pressure in the line.
     DeadWeights,
     /// A rigid bar in the muscle's place.
@@ -50,8 +52,10 @@ pub enum BenchCheck {
     RigidBar,
     /// Dead weights on the load cell.
     DeadWeights,
-    /// A reference gauge, and a closed valve.
+    /// A reference gauge beside that of the bench.
     ReferenceGauge,
+    /// A closed valve between supply and muscle.
+    ClosedValve,
     /// The vented length by a calliper.
     VentedLength,
     /// The muscle's weight, and the vented load cell.

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use pam_data::recording::Recording;
+use pam_diagnose::experiment::BenchCheck;
 use pam_fit::bench::Candidate;
 use rayon::prelude::*;
 
@@ -52,8 +53,7 @@ impl Engine {
     #[must_use]
     pub fn rank(&self, left_s: f64, planned: &[(Step, Option<Recording>)]) -> Ranking {
         // Weighing settles only what the diagnosis must have named: the recordings show every constant force at the tares.
-        let settles =
-            |law: Candidate| law.traits().check.and_then(CheckKind::of) == Some(CheckKind::Weighing);
+        let settles = |law: Candidate| law.traits().check == Some(BenchCheck::Weighing);
         let open = self.diagnosis.as_ref().map(sets).unwrap_or_default();
         let constant_force = open.iter().flatten().any(|h| settles(h.law));
         let follows = |step: &Step| {

@@ -40,6 +40,10 @@ pam_data::criteria! {
     SHADOW: f64 = 2.0, "D_hidden/D", "1", Judgement;
     /// Independent rows of any campaign, at least.
     FEWEST_INDEPENDENT: f64 = 8.0, "n_min", "1", Judgement;
+    /// Spans of time with a free zero, in each memory of the residual.
+    ZEROS_PER_MEMORY: f64 = 2.0, "n_zero", "1", Derived("within half of its correlation time a drift is nearly constant");
+    /// Free zeros of a whole campaign at most.
+    MOST_ZEROS: usize = 64, "n_zeros", "1", Cost;
     /// Candidates that may fail in the joint fit before the selection ends.
     MOST_EXCLUDED: usize = 4, "n_barred", "1", Cost;
     /// Selections that may fail on held-out rows before none is made.

@@ -12,6 +12,8 @@ use pam_data::recording::{Named, Quantity, named};
 const REFERENCE: &str = "reference_";
 /// The column of a check by weighing: 1 where muscle and fittings hang on the cell, 0 where nothing does.
 const ATTACHED: &str = "attached";
+/// The column of a check by a closed valve: 1 where the valve between supply and muscle is closed, 0 where it is open.
+const VALVE_CLOSED: &str = "valve_closed";
 /// The smallest number of rows of a check.
 const FEWEST: usize = 20;
 
@@ -20,8 +22,8 @@ pub(super) struct Table {
     file: PathBuf,
     /// Quantity, whether it is the reference, values in SI.
     columns: Vec<(Quantity, bool, Vec<f64>)>,
-    /// Whether muscle and fittings hang on the cell; empty without the column.
-    attached: Vec<f64>,
+    /// Columns of 1 and 0, by name.
+    states: Vec<(&'static str, Vec<f64>)>,
 }
 
 impl Table {
@@ -40,8 +42,10 @@ impl Table {
         let header = reader.headers().map_err(|e| damaged(&e))?.clone();
         let mut columns = Vec::new();
         let mut wanted = Vec::new();
-        let attached_at = header.iter().position(|name| name == ATTACHED);
-        let mut attached = Vec::new();
+        let of_state = |state: &'static str| Some((header.iter().position(|name| name == state)?, state));
+        let states_at: Vec<(usize, &'static str)> =
+            [ATTACHED, VALVE_CLOSED].into_iter().filter_map(of_state).collect();
+        let mut states: Vec<(&'static str, Vec<f64>)> = states_at.iter().map(|s| (s.1, Vec::new())).collect();
         for (at, name) in header.iter().enumerate() {
             let (reference, name) = name.strip_prefix(REFERENCE).map_or((false, name), |n| (true, n));
             match named(name) {
@@ -63,12 +67,12 @@ impl Table {
         for row in reader.records() {
             let row = row.map_err(|e| damaged(&e))?;
             let line = row.position().map_or(0, csv::Position::line);
-            if let Some(at) = attached_at {
-                attached.push(match &row[at] {
+            for ((at, name), (_, state)) in states_at.iter().zip(&mut states) {
+                state.push(match &row[*at] {
                     "0" => 0.0,
                     "1" => 1.0,
                     other => {
-                        let cause = format!("line {line}: `{other}` is neither 1 nor 0 for `{ATTACHED}`");
+                        let cause = format!("line {line}: `{other}` is neither 1 nor 0 for `{name}`");
                         return Err(Error::new(DataCode::CheckInvalid, cause).file(file));
                     }
                 });
@@ -85,7 +89,7 @@ impl Table {
                 column.2.push(value * unit.scale + unit.offset);
             }
         }
-        let table = Self { file: file.to_owned(), columns, attached };
+        let table = Self { file: file.to_owned(), columns, states };
         let rows = table.columns.first().map_or(0, |c| c.2.len());
         if rows < FEWEST {
             return Err(table.poor(format!("{}; a check needs at least {FEWEST}", pluralise(rows, "row"))));
@@ -116,7 +120,17 @@ impl Table {
 
     /// Whether muscle and fittings hang on the cell, 1 or 0 by row.
     pub(super) fn attached(&self) -> Result<&[f64]> {
-        if self.attached.is_empty() { Err(self.without_reference()) } else { Ok(&self.attached) }
+        self.state(ATTACHED)
+    }
+
+    /// Whether the valve between supply and muscle is closed, 1 or 0 by row.
+    pub(super) fn valve_closed(&self) -> Result<&[f64]> {
+        self.state(VALVE_CLOSED)
+    }
+
+    fn state(&self, name: &str) -> Result<&[f64]> {
+        let found = self.states.iter().find(|s| s.0 == name);
+        found.map(|s| s.1.as_slice()).ok_or_else(|| self.without_reference())
     }
 
     /// Whether the known quantity is this one.
@@ -135,7 +149,7 @@ impl Table {
     pub(super) fn without_reference(&self) -> Error {
         Error::new(DataCode::CheckInvalid, "there is no column of the reference")
             .file(&self.file)
-            .help("a check has `reference_force_N`, `reference_displacement_mm`, `reference_pressure_kPa` or `attached` beside the reading")
+            .help("a check has `reference_force_N`, `reference_displacement_mm`, `reference_pressure_kPa`, `attached` or `valve_closed` beside the reading")
     }
 
     /// The error of a check that determines nothing.

@@ -35,8 +35,9 @@ fn bench_check(check: BenchCheck) -> &'static str {
         BenchCheck::DeadWeights => {
             "hang dead weights on the load cell, with and without pressure in the line"
         }
-        BenchCheck::ReferenceGauge => {
-            "compare the gauge with a reference at three pressures, and close the valve for a minute"
+        BenchCheck::ReferenceGauge => "compare the gauge with a reference at three pressures",
+        BenchCheck::ClosedValve => {
+            "close the valve of the muscle under pressure for half a minute, three times"
         }
         BenchCheck::VentedLength => "measure the vented length with a calliper before and after",
         BenchCheck::Weighing => {
@@ -61,6 +62,7 @@ pub(super) fn needs_strokes(measure: Experiment) -> bool {
         Experiment::VentedReadings
         | Experiment::Weighing
         | Experiment::ReferenceGauge
+        | Experiment::ClosedValve
         | Experiment::DeadWeights
         | Experiment::RigidBar
         | Experiment::VentedLength
@@ -78,6 +80,9 @@ pub fn measure(measure: Experiment) -> &'static str {
         Experiment::VentedReadings => "record the vented load cell before, between and after the tests",
         Experiment::Weighing => "weigh the muscle and its fittings, or turn the bench by 90°",
         Experiment::ReferenceGauge => "compare the gauge with a reference, vented and at three pressures",
+        Experiment::ClosedValve => {
+            "close the valve of the muscle under pressure for half a minute, three times"
+        }
         Experiment::DeadWeights => {
             "hang dead weights on the load cell, with and without pressure in the line"
         }
