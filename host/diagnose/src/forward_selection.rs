@@ -128,7 +128,7 @@ impl<'a> ForwardSelection<'a> {
         if self.first_scan.is_none() {
             self.first_scan = Some((best.clone(), p.clone()));
         }
-        let Some(at) = self.winner(&best, &scorer) else { return ControlFlow::Break(()) };
+        let Some(at) = self.winner(&best, &p, &scorer) else { return ControlFlow::Break(()) };
         if self.chosen.is_empty() {
             self.energy_before = best[at].before;
             self.excess_energy = self.excess_of(self.energy_before);
@@ -136,7 +136,7 @@ impl<'a> ForwardSelection<'a> {
         if !self.is_sufficient(&best[at], p[at]) {
             return ControlFlow::Break(());
         }
-        let winner = self.best_known(&best[at], &best, &scorer);
+        let winner = self.best_within_known_range(&best[at], &best, &scorer);
         if let Some(memory) = self.memory_of_unknown_start(&winner) {
             self.remarks.push(Remark::Refused {
                 effect: self.library[winner.candidate].name().to_owned(),
@@ -180,31 +180,38 @@ impl<'a> ForwardSelection<'a> {
     }
 
     /// Which of the best of each candidate is to be judged.
-    fn winner(&self, best: &[CandidateFit], scorer: &Scorer<'_>) -> Option<usize> {
-        let open = best.iter().enumerate().filter(|(_, t)| self.is_eligible(t, scorer));
-        let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
+    fn winner(&self, best: &[CandidateFit], p: &[f64], scorer: &Scorer<'_>) -> Option<usize> {
+        let open = || best.iter().enumerate().filter(|(_, t)| self.is_eligible(t, scorer));
+        // What a check of the bench shows is there, whether or not something else explains more.
+        let shown = |t: &CandidateFit| self.library[t.candidate].shown_by_check;
+        if let Some((at, _)) = open().find(|(at, t)| shown(t) && self.is_sufficient(t, p[*at])) {
+            return Some(at);
+        }
+        let (at, winner) = open().max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
         // Where an effect that the tables conceal explains far more, the next best is only correlated with it.
         let best_of_all = best.iter().map(|t| t.score).fold(0.0, f64::max);
         let shadow = best_of_all > (winner.score + LEAST_SCORE_ALONE).max(SHADOW * winner.score);
         (!self.chosen.is_empty() || !shadow).then_some(at)
     }
 
-    /// The winner; or the best that explains the same and that a check of the bench shows; or, where the winner explains the misfit only at
-    /// the edge of what is known of it, the best that explains the same within what is known. The winner has shown that there is something
-    /// to explain: its score stays.
-    fn best_known(&self, winner: &CandidateFit, best: &[CandidateFit], scorer: &Scorer<'_>) -> CandidateFit {
+    /// The winner; or, where it explains the misfit only at the edge of what is known of it, the best that explains the same within what
+    /// is known. The winner has shown that there is something to explain: its score stays.
+    fn best_within_known_range(
+        &self,
+        winner: &CandidateFit,
+        best: &[CandidateFit],
+        scorer: &Scorer<'_>,
+    ) -> CandidateFit {
         let known = |t: &CandidateFit| t.is_within_known_range(&self.library[t.candidate]);
-        let shown = |t: &CandidateFit| self.library[t.candidate].shown_by_check;
-        let any_shown = best.iter().any(|t| shown(t) && self.is_eligible(t, scorer));
-        if shown(winner) || (known(winner) && !any_shown) {
+        if known(winner) {
             return winner.clone();
         }
         let metric = baselines::fit(&self.rows, Kind::Soft(winner.prior), &[]);
         let competitors = competitors(winner, best, self.library, &self.rows, scorer, &metric.span);
         let alike = |t: &CandidateFit| competitors.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
         best.iter()
-            .filter(|t| (shown(t) || (known(t) && !known(winner))) && alike(t) && self.is_eligible(t, scorer))
-            .max_by(|a, b| shown(a).cmp(&shown(b)).then(a.score.total_cmp(&b.score)))
+            .filter(|t| known(t) && alike(t) && self.is_eligible(t, scorer))
+            .max_by(|a, b| a.score.total_cmp(&b.score))
             .map_or_else(
                 || winner.clone(),
                 |t| CandidateFit { score: winner.score.max(t.score), ..t.clone() },
@@ -238,11 +245,9 @@ impl<'a> ForwardSelection<'a> {
         let by_blocks = p <= FAMILY_ALPHA;
         let significant = winner.score >= if by_blocks { LEAST_SCORE } else { LEAST_SCORE_ALONE };
         let of_rest = self.of_rest(winner);
-        let worth = if self.chosen.is_empty() {
-            of_rest >= LEAST_SHARE
-        } else {
-            winner.gain / self.excess_energy >= FURTHER_SHARE && of_rest >= LEAST_SHARE
-        };
+        let least = if self.library[winner.candidate].shown_by_check { FURTHER_SHARE } else { LEAST_SHARE };
+        let of_all = winner.gain / self.excess_energy;
+        let worth = of_rest >= least && (self.chosen.is_empty() || of_all >= FURTHER_SHARE);
         // A wall at the end of the stroke is high and narrow.
         let narrow =
             winner.peak >= NARROW_PEAK * self.blocked && winner.score >= NARROW_SCORE * LEAST_SCORE_ALONE;

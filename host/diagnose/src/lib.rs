@@ -20,6 +20,7 @@
 //! | | `renewed_laws` | memories of the turn, seen from a base that was fitted beside them |
 //! | | `likelihood` | how strongly the recordings support a candidate |
 //! | selection | `forward_selection`, `selection_step` | which effects are selected, and when none is |
+//! | | `free_zero` | whether a slow effect explains what a drifting zero of the load cell does not |
 //! | | `cross_validation`, `confirmation` | the error on held-out rows, which a selected effect must reduce |
 //! | | `known_effects` | effects that the user gives as known |
 //! | findings | `findings`, `calibration` | parameters and probabilities; what could be hidden |
