@@ -113,7 +113,7 @@ impl CheckKind {
         }
     }
 
-    /// Whether the check tells what an effect is, so that no motion needs to.
+    /// Whether the check measures an effect, so that no motion needs to show it.
     #[must_use]
     pub fn settles(self, effect: Candidate) -> bool {
         let kind = match self {

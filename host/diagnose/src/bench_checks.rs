@@ -46,7 +46,7 @@ enum Leak {
     Absent,
     /// It may matter.
     Possible,
-    /// It matters, whatever the line.
+    /// It matters, with any line.
     Present,
 }
 
@@ -146,7 +146,7 @@ impl BenchChecks {
         self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && excluded)
     }
 
-    /// Whether a check shows an effect, and the recordings tell how large it is.
+    /// Whether a check shows an effect, whose size follows from the recordings.
     pub(super) fn shows(&self, candidate: &Candidate) -> bool {
         let leak = candidate.is(LEAK) && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Present);
         leak || self.likely.iter().any(|m| candidate.is(Law::Bench(m.fault)))

@@ -69,7 +69,7 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// The same; `shown` tells whether a check of the bench shows that it is there.
+    /// The same; `shown` says if a check of the bench shows that it is there.
     pub(crate) fn with_check(self, shown: bool) -> Self {
         Self { shown_by_check: shown, ..self }
     }

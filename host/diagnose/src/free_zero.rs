@@ -48,7 +48,7 @@ fn zeros(rows: &Rows, memory: f64) -> Vec<Vec<f64>> {
     spans.iter().map(column).collect()
 }
 
-/// Spans of at least so many rows; a recording begins a new one where they are kept apart.
+/// Spans of at least this number of rows; a recording begins a new one where they are kept apart.
 fn spans(rows: &Rows, least: usize, apart: bool) -> Vec<std::ops::Range<usize>> {
     let mut spans: Vec<std::ops::Range<usize>> = Vec::new();
     for row in 0..rows.len() {

@@ -55,7 +55,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Whether the check tells what an effect of the catalogue is, so that recordings need not.
+    /// Whether the check measures an effect of the catalogue, so that recordings need not show it.
     #[must_use]
     pub fn settles(self, effect: Candidate) -> bool {
         let of_bench = |names: &[BenchName]| names.iter().any(|n| effect == Candidate::Bench(*n));

@@ -4,8 +4,8 @@
 //! dP/dt = −r P        r: rate of the loss, 1/s
 //! λ = r T             the part of the pressure that the flow r P costs on its way; T: the time in which the line fills the muscle
 //! ```
-//! Nothing measures `T`; the lag of the pressure in the catalogue has its range. So the check tells whether a leak can matter, and whether
-//! it must; its size is for the recordings to tell.
+//! Nothing measures `T`; the lag of the pressure in the catalogue has its range. So the check shows if a leak can matter, and if it
+//! must; its size follows from the recordings.
 
 use super::Uncertainty;
 use super::table::Table;
