@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use model_core::braid::Braid;
-use model_core::effects::{EffectName, MEMORY};
+use model_core::effects::MEMORY;
 
 use super::baselines::{self, Baseline, Kind};
 use super::candidates::Candidate;
@@ -19,9 +19,6 @@ use pam_data::error::Result;
 use pam_data::recording::Campaign;
 use pam_fit::bench::{BenchName, Candidate as Law};
 use pam_fit::checks::{self, Checks, Loss, Measured};
-
-/// The effect that a closed valve shows.
-const LEAK: Law = Law::Muscle(EffectName::Leak);
 
 /// A fault that was checked, and how large it is in these recordings.
 struct Judged {
@@ -141,14 +138,16 @@ impl BenchChecks {
     /// An effect that the user gives as known is fitted even where a check found it immaterial.
     pub(super) fn settles(&self, candidate: &Candidate, given: &[Law]) -> bool {
         let is = |j: &Judged| candidate.is(Law::Bench(j.measured.fault));
-        let tight = candidate.is(LEAK) && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Absent);
+        let tight =
+            candidate.traits.loses_air && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Absent);
         let excluded = tight || self.absent.iter().any(is);
         self.named.iter().any(is) || (!given.iter().any(|g| candidate.is(*g)) && excluded)
     }
 
     /// Whether a check shows an effect, whose size follows from the recordings.
     pub(super) fn shows(&self, candidate: &Candidate) -> bool {
-        let leak = candidate.is(LEAK) && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Present);
+        let leak =
+            candidate.traits.loses_air && self.leak.as_ref().is_some_and(|l| l.finding == Leak::Present);
         leak || self.likely.iter().any(|m| candidate.is(Law::Bench(m.fault)))
     }
 
@@ -179,9 +178,11 @@ impl BenchChecks {
                 .map(|m| Remark::Measured { check: m.check.to_string(), value: m.words.to_string() }),
         );
         if let Some(l) = &self.leak {
-            if l.finding == Leak::Absent && !given.contains(&LEAK) {
+            let leak = Law::all().find(|c| c.traits().loses_air);
+            let absent = leak.filter(|c| l.finding == Leak::Absent && !given.contains(c));
+            if let Some(leak) = absent {
                 diagnosis.considered.push(Considered {
-                    effect: LEAK.info().name.into(),
+                    effect: leak.info().name.into(),
                     gain: 0.0,
                     why_not: WhyNot::Measured {
                         check: l.loss.check.to_string(),

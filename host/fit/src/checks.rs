@@ -32,7 +32,6 @@ use std::path::Path;
 
 use crate::bench::{BenchName, Candidate};
 use crate::numerics::student::{effective_freedom, half_width};
-use model_core::effects::EffectName;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Quantity};
 
@@ -66,7 +65,7 @@ impl Kind {
             }
             Self::ReferenceGauge => of_bench(&[BenchName::GaugeGain]),
             Self::Weighing => of_bench(&[BenchName::Gravity]),
-            Self::ClosedValve => effect == Candidate::Muscle(EffectName::Leak),
+            Self::ClosedValve => effect.traits().loses_air,
         }
     }
 

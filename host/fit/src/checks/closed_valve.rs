@@ -94,7 +94,7 @@ fn rate(time: &[f64], pressure: &[f64], closed: &[f64], first: usize) -> Option<
     if begin < PRESSED || end - first < 2 {
         return None;
     }
-    // As one does with a ruler: from the pressure before to the end, or to where a half is lost.
+    // From the pressure before the valve closes to the end, or to where a half of it is lost.
     let last = (first..end).find(|i| pressure[*i] < FOLLOWED * begin).unwrap_or(end - 1);
     let closed_at = 0.5 * (time[first - 1] + time[first]);
     let seconds = time[last] - closed_at;
