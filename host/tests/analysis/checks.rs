@@ -204,6 +204,32 @@ fn a_closed_valve_says_whether_a_loss_of_pull_is_a_leak() {
     }
 }
 
+/// Each stay is off by its own error, so that chance could still be the cause of what the check shows. It is not excluded for that.
+#[test]
+fn a_fault_that_a_check_shows_without_certainty_is_left_to_the_recordings() {
+    let mut bench = bench();
+    bench.rig.hose = 3e-5;
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("dead_weights.csv");
+    let mut text = String::from("time_s,force_N,reference_force_N,pressure_kPa\n");
+    let errors = [1.6, -1.4, 0.3, -0.9, -1.7, 1.2, 0.8, -1.1];
+    for (stay, error) in errors.into_iter().enumerate() {
+        let (weight, pressure) = (40.0 * (stay / 2) as f64, 500.0 * (stay % 2) as f64);
+        for row in 0..20 {
+            let force = weight + bench.rig.hose * 1e3 * pressure + error;
+            let _ = writeln!(text, "{},{force:.4},{weight},{pressure}", stay * 20 + row);
+        }
+    }
+    std::fs::write(&path, text).expect("written");
+    let checks = Checks::read(&[&path]).expect("a check");
+    let thrust = checks.measured().iter().find(|m| m.fault == BenchName::CrossTalk).expect("a pressed line");
+    assert!(thrust.is_likely() && !thrust.is_sure(), "{thrust:?}");
+    let answer = diagnosed(&bench, checks);
+    let named: Vec<&str> = answer.missing.iter().map(|m| m.effect.as_str()).collect();
+    assert_eq!(named, ["cross-talk"]);
+    assert!(answer.missing[0].confusable_with.is_empty(), "{:?}", answer.missing[0].confusable_with);
+}
+
 /// Each stay at a weight is off by its own error, as a cell that creeps is: the rows of a stay repeat it.
 #[test]
 fn few_stays_do_not_make_a_sound_load_cell_faulty() {
