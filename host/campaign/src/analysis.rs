@@ -67,7 +67,8 @@ fn set(missing: &Missing) -> Option<Vec<Hypothesis>> {
     let mut set = vec![Hypothesis {
         law,
         weight: if competitors.is_empty() { 1.0 } else { own },
-        parameters: Some(missing.parameters.iter().map(|p| p.value).collect()),
+        parameters: (!missing.parameters.is_empty())
+            .then(|| missing.parameters.iter().map(|p| p.value).collect()),
     }];
     set.extend(competitors.into_iter().map(|law| Hypothesis {
         law,

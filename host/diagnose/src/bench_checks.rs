@@ -32,7 +32,8 @@ struct Judged {
 /// What a closed valve says of a leak.
 struct LeakCheck {
     loss: Loss,
-    /// The largest force that the leak may take at any row, N.
+    /// The largest force that the leak takes at any row, N: at the least, and at the most.
+    at_least: f64,
     at_most: f64,
     finding: Leak,
 }
@@ -45,6 +46,40 @@ enum Leak {
     Possible,
     /// It matters, with any line.
     Present,
+}
+
+impl LeakCheck {
+    /// Enters what the closed valve showed into an answer of the recordings. A leak that matters is named also where the recordings do not
+    /// determine its size: then it has no parameters, and stays out of the table.
+    fn enter(&self, diagnosis: &mut Diagnosis, given: &[Law]) {
+        let Some(leak) = Law::all().find(|c| c.traits().loses_air) else { return };
+        let (check, value) = (self.loss.check.to_string(), self.loss.words.clone());
+        let info = leak.info();
+        let named = diagnosis.missing.iter().any(|m| m.effect == info.name);
+        match self.finding {
+            Leak::Absent if !given.contains(&leak) => diagnosis.considered.push(Considered {
+                effect: info.name.into(),
+                gain: 0.0,
+                why_not: WhyNot::Measured { check, value },
+                hidden_up_to_N: Some(self.at_most),
+                checked: true,
+                visible: 1.0,
+            }),
+            Leak::Present if diagnosis.judged() && !named => {
+                diagnosis.considered.retain(|c| c.effect != info.name);
+                diagnosis.missing.push(Missing {
+                    checked: true,
+                    peak_N: self.at_least,
+                    p: (self.loss.half_width / self.loss.rate).powi(2).min(1.0),
+                    ..Missing::of(info, CHECKED_PROBABILITY, Why::Measured { check, value })
+                });
+                if diagnosis.verdict() == Verdict::Consistent {
+                    diagnosis.outcome = Outcome::Judged(Verdict::Explained);
+                }
+            }
+            _ => diagnosis.remarks.push(Remark::Measured { check, value }),
+        }
+    }
 }
 
 /// What checks of the bench measured.
@@ -111,7 +146,7 @@ impl BenchChecks {
             } else {
                 Leak::Possible
             };
-            LeakCheck { loss: loss.clone(), at_most: most * pull, finding }
+            LeakCheck { loss: loss.clone(), at_least: least * pull, at_most: most * pull, finding }
         });
         if !known.named.is_empty() {
             known.before = Some((rows, fitted));
@@ -178,24 +213,7 @@ impl BenchChecks {
                 .map(|m| Remark::Measured { check: m.check.to_string(), value: m.words.to_string() }),
         );
         if let Some(l) = &self.leak {
-            let leak = Law::all().find(|c| c.traits().loses_air);
-            let absent = leak.filter(|c| l.finding == Leak::Absent && !given.contains(c));
-            if let Some(leak) = absent {
-                diagnosis.considered.push(Considered {
-                    effect: leak.info().name.into(),
-                    gain: 0.0,
-                    why_not: WhyNot::Measured {
-                        check: l.loss.check.to_string(),
-                        value: l.loss.words.clone(),
-                    },
-                    hidden_up_to_N: Some(l.at_most),
-                    checked: true,
-                    visible: 1.0,
-                });
-            } else {
-                let (check, value) = (l.loss.check.to_string(), l.loss.words.clone());
-                diagnosis.remarks.push(Remark::Measured { check, value });
-            }
+            l.enter(&mut diagnosis, given);
         }
         if !diagnosis.judged() {
             // The fault is known all the same; its share of these recordings is not.

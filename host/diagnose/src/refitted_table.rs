@@ -145,6 +145,10 @@ fn parts(diagnosis: &Diagnosis) -> (Vec<FittedEffect>, Vec<Correction>) {
     let mut corrections = Vec::new();
     for m in &diagnosis.missing {
         let values: Vec<f64> = m.parameters.iter().map(|p| p.value).collect();
+        if values.is_empty() {
+            // A check shows it, and nothing its size.
+            continue;
+        }
         match Candidate::from_name(&m.effect) {
             // The memory found by the history layer goes into a table by its own fit, or not at all.
             Some(Candidate::Muscle(_)) if history::is_from_history(m) => {}
