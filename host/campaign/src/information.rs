@@ -158,11 +158,10 @@ impl<'a> Design<'a> {
     }
 
     fn of_check(&self, check: CheckKind) -> Gain {
-        let settles = |law: Candidate| check.settles(law);
         let mut gain = Gain::default();
         for set in self.known.sets {
             let apart = |i: usize, j: usize| {
-                if settles(set[i].law) || settles(set[j].law) { DECIDED } else { 0.0 }
+                if check.settles(set[i].law) || check.settles(set[j].law) { DECIDED } else { 0.0 }
             };
             gain.set += entropy(set, |_, _| 0.0) - entropy(set, apart);
         }

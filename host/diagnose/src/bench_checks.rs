@@ -53,7 +53,7 @@ impl LeakCheck {
     /// determine its size: then it has no parameters, and stays out of the table.
     fn enter(&self, diagnosis: &mut Diagnosis, given: &[Law]) {
         let Some(leak) = Law::all().find(|c| c.traits().loses_air) else { return };
-        let (check, value) = (self.loss.check.to_string(), self.loss.words.clone());
+        let (check, value) = (Loss::CHECK.to_string(), self.loss.words());
         let info = leak.info();
         let named = diagnosis.missing.iter().any(|m| m.effect == info.name);
         match self.finding {

@@ -157,7 +157,7 @@ fn weighing(bench: &BenchSpec, clock: f64) -> Check {
 fn closed_valve(bench: &BenchSpec, pressure: f64, clock: f64) -> Check {
     let mut gauge = channel(bench, "pressure");
     let air = &bench.pneumatics;
-    // What the line would fill in its time, the leak loses in so much longer.
+    // The conductance of the leak is a share of that of the line, which fills the muscle in its time.
     let loss = air.leak / air.line.max(1e-5);
     let mut csv = String::from("time_s,pressure_kPa,valve_closed\n");
     let (mut t, mut inside) = (clock, pressure);

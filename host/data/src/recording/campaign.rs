@@ -1,7 +1,7 @@
 //! Several recordings of one muscle, in the order in which they happened.
 
 use super::Recording;
-use crate::statistics::{extremes, median};
+use crate::statistics::{median, range};
 
 /// A clock that shows more at the first reading was not started for the campaign, s (a day and some).
 const LONGEST_CLOCK: f64 = 1.0e5;
@@ -145,9 +145,9 @@ fn joined_runs(recording: &Recording) -> Option<String> {
     if pauses.is_empty() {
         return None;
     }
-    let range = extremes(stroke.iter());
+    let range = range(stroke.iter());
     let change = |i: &usize| (stroke[*i] - stroke[i - 1]).abs();
-    let at = pauses.into_iter().find(|i| change(i) > CHANGE * (range.1 - range.0))?;
+    let at = pauses.into_iter().find(|i| change(i) > CHANGE * range)?;
     Some(format!(
         "the clock of `{}` pauses for {:.0} s at {:.2} s, and the length changes by {:.2} mm: if several runs are in one file, set them apart \
          (`host import --guess` finds columns that number them)",

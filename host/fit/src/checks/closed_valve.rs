@@ -12,6 +12,7 @@ use super::table::Table;
 use crate::bench::Candidate;
 use model_core::effects::EffectName;
 use pam_data::error::Result;
+use pam_data::pluralise::pluralise;
 use pam_data::recording::Quantity;
 
 /// Readings before a valve closes whose mean is the pressure at which it closed.
@@ -30,13 +31,24 @@ pub struct Loss {
     pub rate: f64,
     /// Half of its 95 % interval.
     pub half_width: f64,
-    /// The rate with its interval, as text with practical units.
-    pub words: String,
-    /// Which check measured it, as text.
-    pub check: &'static str,
 }
 
 impl Loss {
+    /// Which check measured it, as text.
+    pub const CHECK: &str = "a closed valve";
+
+    /// The rate with its interval, as text with practical units.
+    #[must_use]
+    pub fn words(&self) -> String {
+        format!(
+            "behind the closed valve {:.3} ± {:.3} % of the pressure is lost per second, which costs at least {:.2} % of the pressure at \
+             the muscle",
+            100.0 * self.rate,
+            100.0 * self.half_width,
+            100.0 * self.lost_part().0
+        )
+    }
+
     /// The part of the pressure that the loss may cost between gauge and muscle, at the least and at the most.
     #[must_use]
     pub fn lost_part(&self) -> (f64, f64) {
@@ -65,28 +77,16 @@ pub(super) fn measure(table: &Table) -> Result<Loss> {
     let n = rates.len();
     if n < FEWEST {
         return Err(table.poor(format!(
-            "the valve closes {n} time{} at more than {:.0} kPa: close it at least {FEWEST} times, each after {BEFORE} readings or more \
+            "the valve closes {} at more than {:.0} kPa: close it at least {FEWEST} times, each after {BEFORE} readings or more \
              with the valve open, and for some seconds",
-            if n == 1 { "" } else { "s" },
+            pluralise(n, "time"),
             PRESSED * 1e-3
         )));
     }
     let mean = rates.iter().sum::<f64>() / n as f64;
     let variance = rates.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n - 1) as f64;
     let uncertain = Uncertainty::of((variance / n as f64).sqrt(), (n - 1) as f64);
-    let half_width = uncertain.half_width();
-    Ok(Loss {
-        rate: mean,
-        half_width,
-        words: format!(
-            "behind the closed valve {:.3} ± {:.3} % of the pressure is lost per second, which costs at least {:.2} % of the pressure at \
-             the muscle",
-            100.0 * mean,
-            100.0 * half_width,
-            100.0 * (mean - half_width).max(0.0) * filling_time().0
-        ),
-        check: "a closed valve",
-    })
+    Ok(Loss { rate: mean, half_width: uncertain.half_width() })
 }
 
 /// How fast the pressure falls after the valve closes at a row, 1/s; nothing for a vented muscle or a single reading.

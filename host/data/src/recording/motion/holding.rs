@@ -9,8 +9,7 @@ use super::criteria::{
 };
 use super::scale::Scale;
 use super::turning::Leg;
-use crate::statistics::median;
-use crate::statistics::range;
+use crate::statistics::{median, range};
 
 /// A stretch of samples at held length, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]
