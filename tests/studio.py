@@ -88,8 +88,11 @@ def ten_minutes(page):
 
 def reads_where_one_points(page):
     value = "document.querySelector('[data-of=F]').textContent"
-    # On a slow machine, the samples may not yet extend to the middle of the picture.
-    page.until("ring.last('t') - ring.get('t', 0) > Number(document.getElementById('window').value)", 240)
+    # No sample arrives while the guide's own order has the controller: the picture must begin after that gap.
+    page.until("""(() => { const from = ring.last("t") - Number(document.getElementById("window").value), k = ring.since(from);
+      if (!k) return false;
+      for (let i = k; i < ring.length; i++) if (ring.get("t", i) - ring.get("t", i - 1) > GAP) return false;
+      return true; })()""", 240)
     page.click("hold")
     page.over("#p-force")
     # The middle of the picture from its geometry; the value there from a search of all samples.
@@ -119,11 +122,20 @@ def reads_where_one_points(page):
     page.until(f"parseFloat(document.getElementById('cursor-time').textContent.slice(3)) < {found['told']} - {found['pixel']}")
     page.js("document.activeElement.blur()")
     assert page.text("cursor-time") == "", page.text("cursor-time")
-    # No value is shown where no curve is drawn: before the first sample and after the last.
-    blank = page.js("""shown.length = 100;
-      const told = [0.1, 1].map((to) => { point(to); return document.querySelector("[data-of=F]").textContent; });
-      scopes[0].to += 5; point(1); told.push(document.querySelector("[data-of=F]").textContent); point(null); return told""")
-    assert blank[0] == blank[2] == "measured" and blank[1].startswith("measured "), blank
+    # No value is shown where no curve is drawn: before the first sample, after the last one and where samples are missing.
+    blank = page.js("""const read = (time) => { point((time - scopes[0].from) / (scopes[0].to - scopes[0].from)); return document.querySelector("[data-of=F]").textContent; };
+      // How often a curve of this time is begun anew, and whether anything is drawn there.
+      const parts = () => { const g = scopes[0].axes.g, moved = g.moveTo; let n = 0; g.moveTo = function (x, y) { n++; return moved.call(this, x, y); }; scopes[0].draw(view); g.moveTo = moved; return n; };
+      const end = shown.last("t"), whole = parts(), inside = read(end - 2);
+      for (let k = 0; k < shown.length; k++) if (shown.get("t", k) <= end - 2) shown.columns.t[shown.index(k)] -= 1;
+      scopes[0].show(shown);
+      const found = {inside, gap: read(end - 2.5), edges: [read(end - 3.0), read(end - 1.99)], begins: parts() - whole};
+      shown.length = 100; found.before = read(end - 4); found.last = read(end);
+      scopes[0].to += 5; found.after = read(end + 4); point(null); return found""")
+    assert blank["before"] == blank["after"] == blank["gap"] == "measured", blank
+    assert all(v.startswith("measured ") for v in (blank["inside"], *blank["edges"], blank["last"])), blank
+    # Measured, setpoint and table each begin anew once.
+    assert blank["begins"] == 3, blank
     page.over("h1")
     page.click("hold")
     page.until(f"{value} !== {json.dumps(said)}")

@@ -10,6 +10,10 @@ function colour(name) {
   return value;
 }
 
+// Longest time between two samples of a curve, s. Where it is longer, samples are missing: another order uses the line to the controller, or
+// the line lost them. Nothing is drawn or read there. The controller sends a sample per millisecond, and the history keeps 10 values per second.
+const GAP = 0.15;
+
 class Ring {
   constructor(size, names) {
     this.size = size; this.length = 0; this.at = 0; this.pushed = 0; this.cleared = 0;
@@ -38,6 +42,14 @@ class Ring {
     let low = 0, high = this.length;
     while (low < high) { const mid = (low + high) >> 1; if (this.get("t", mid) < time) low = mid + 1; else high = mid; }
     return low;
+  }
+  // The sample that is drawn at a time: the first from it on, or the nearest one within a reach. None (-1) where no curve is drawn: before the
+  // first sample, after the last one and in a gap.
+  drawn(time, reach) {
+    const next = this.since(time), before = next > 0 ? time - this.get("t", next - 1) : Infinity;
+    const after = next < this.length ? this.get("t", next) - time : Infinity;
+    if (before + after <= GAP || (after <= reach && after <= before)) return next;
+    return before <= reach ? next - 1 : -1;
   }
 }
 
@@ -148,8 +160,8 @@ function extent(...lists) {
 // Where a picture's data begin and end, beside its labels.
 const LEFT = 46, RIGHT = 8;
 
-// Curves over time. Where a reading left what its sensor can give, the curve has a gap and the picture's edge a
-// mark, on the side to which it left; the axis is set by the other readings.
+// Curves over time. Where samples are missing, the curve has a gap. Where a reading left what its sensor can give, it has a gap, too, and the
+// picture's edge a mark, on the side to which it left; the axis is set by the other readings.
 class Scope {
   constructor(canvas, ring, curves, names = curves.map((c) => c[0])) { this.axes = new Axes(canvas); this.curves = curves; this.names = names; this.show(ring); }
   // Another ring from now on.
@@ -172,13 +184,14 @@ class Scope {
     this.left = 0;
     for (const [name, shade] of this.curves) {
       const { least, most, first, last, left } = s.curves[name];
-      let begun = false;
+      let previous = -Infinity;
       g.strokeStyle = colour(shade); g.lineWidth = 1.5; g.beginPath();
       s.each((slot, number) => {
         const x = X(number * s.step);
         if (left[slot]) { this.left = left[slot]; g.fillStyle = colour("--alarm"); g.fillRect(x - 0.5, left[slot] > 0 ? top : bottom - 5, 1.5, 5); }
-        if (least[slot] > most[slot]) { begun = false; return; }
-        if (begun) g.lineTo(x, Y(first[slot])); else { g.moveTo(x, Y(first[slot])); begun = true; }
+        if (least[slot] > most[slot]) { previous = -Infinity; return; }
+        if ((number - previous - 1) * s.step <= GAP) g.lineTo(x, Y(first[slot])); else g.moveTo(x, Y(first[slot]));
+        previous = number;
         if (most[slot] > least[slot]) { g.lineTo(x, Y(most[slot])); g.lineTo(x, Y(least[slot])); g.lineTo(x, Y(last[slot])); }
       });
       g.stroke();
@@ -198,7 +211,9 @@ class Loop {
   drawSpan(begins, ends) {
     const r = this.ring, xs = r.columns[this.x], ys = r.columns[this.y], from = r.since(begins), until = r.since(ends + 1e-6);
     const every = Math.max(1, Math.ceil((until - from) / this.most)), oldest = r.pushed - r.length;
-    const begin = Math.ceil((oldest + from) / every) * every - oldest, start = r.index(begin);
+    const begin = Math.ceil((oldest + from) / every) * every - oldest, start = r.index(begin), times = r.columns.t;
+    // Time between two points where no sample is missing, and what counts as a gap.
+    const usual = until > from + 1 ? every * (r.get("t", until - 1) - r.get("t", from)) / (until - 1 - from) : 0, apart = GAP + usual;
     let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
     for (let k = begin, i = start; k < until; k += every) {
       const x = xs[i], y = ys[i];
@@ -209,10 +224,12 @@ class Loop {
     if (x0 > x1) { x0 = y0 = 0; x1 = y1 = 1; }
     const { X, Y } = this.axes.begin(x0, x1, y0, y1), g = this.axes.g;
     g.strokeStyle = colour(this.shade); g.lineWidth = 1.2; g.beginPath();
-    for (let k = begin, i = start, begun = false; k < until; k += every) {
-      if (!Number.isFinite(xs[i] + ys[i])) begun = false;
-      else if (begun) g.lineTo(X(xs[i]), Y(ys[i]));
-      else { g.moveTo(X(xs[i]), Y(ys[i])); begun = true; }
+    for (let k = begin, i = start, previous = -Infinity; k < until; k += every) {
+      if (!Number.isFinite(xs[i] + ys[i])) previous = -Infinity;
+      else {
+        if (times[i] - previous <= apart) g.lineTo(X(xs[i]), Y(ys[i])); else g.moveTo(X(xs[i]), Y(ys[i]));
+        previous = times[i];
+      }
       i += every; if (i >= r.size) i -= r.size;
     }
     g.stroke(); this.axes.end();

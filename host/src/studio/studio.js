@@ -107,21 +107,19 @@ function take(m) {
 // Where in the pictures over time values are read, as a part of their width: where the pointer is, or by the arrow keys.
 let cursor = null;
 const cursorTime = () => scopes[0].from + cursor * (scopes[0].to - scopes[0].from);
-// The sample that is read: the first from the cursor on, without a cursor the newest; none (-1) more than a pixel before the first sample
-// or after the last, where nothing is drawn.
-function read() {
-  if (cursor === null || !shown.length) return shown.length - 1;
-  const { from, to, axes: { canvas } } = scopes[0], pixel = (to - from) / (canvas.clientWidth - LEFT - RIGHT), time = cursorTime();
-  if (time < shown.get("t", 0) - pixel || time > shown.last("t") + pixel) return -1;
-  return Math.min(shown.since(time), shown.length - 1);
+// The sample that is drawn within a pixel of a time; none (-1) where nothing is drawn.
+function drawnAt(time) {
+  const { from, to, axes: { canvas } } = scopes[0], pixel = (to - from) / (canvas.clientWidth - LEFT - RIGHT);
+  return shown.drawn(time, pixel);
 }
 
 // Behind each curve's name its value there, as often as a user can read it; the setpoint belongs to one of the pictures.
 const DECIMALS = { F: 1, m: 1, P: 1, c: 1, x: 2, a: 1 };
 const keys = [...document.querySelectorAll("[data-of]")].map((place) => ({ place, word: place.textContent, ...place.dataset }));
 function readings() {
-  const at = read(), from = markTime(), apart = cursorTime() - from;
-  const marked = mark !== null && shown.length && mark >= shown.get("t", 0) && mark <= shown.last("t") ? Math.min(shown.since(mark), shown.length - 1) : -1;
+  // Without a cursor, the newest sample is read.
+  const at = cursor === null ? shown.length - 1 : drawnAt(cursorTime()), from = markTime(), apart = cursorTime() - from;
+  const marked = mark === null ? -1 : drawnAt(mark);
   $("cursor-time").textContent = cursor === null ? (mark === null ? "" : `mark at ${from.toFixed(3)} s`)
     : `at ${cursorTime().toFixed(3)} s` + (mark === null ? "" : `, ${apart.toFixed(3)} s from the mark (${(1 / Math.abs(apart)).toPrecision(3)} Hz)`);
   for (const k of keys) {
