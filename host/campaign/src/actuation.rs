@@ -3,7 +3,7 @@
 use pam_data::error::Result;
 
 use crate::course::Course;
-use crate::step::CheckKind;
+use pam_fit::checks;
 
 /// One reading, SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -49,7 +49,7 @@ pub trait Actuation {
     ///
     /// # Errors
     /// As [`Actuation::perform`].
-    fn check(&mut self, check: CheckKind, force: f64, pressure: f64) -> Result<Option<String>>;
+    fn check(&mut self, check: checks::Kind, force: f64, pressure: f64) -> Result<Option<String>>;
 
     /// Whether the clock can pause while the program computes. A real muscle waits vented.
     fn compute(&mut self, _computing: bool) {}

@@ -8,7 +8,7 @@ use virtual_bench::checks;
 use crate::actuation::{Actuation, Ending, Reading};
 use crate::course::{Course, Segment};
 use crate::criteria::SAMPLE_HZ;
-use crate::step::CheckKind;
+use pam_fit::checks::Kind;
 
 /// A muscle on the virtual bench.
 #[derive(Debug)]
@@ -155,10 +155,10 @@ impl Actuation for VirtualBench {
         failed.map_or(Ok(ending), Err)
     }
 
-    fn check(&mut self, check: CheckKind, force: f64, pressure: f64) -> Result<Option<String>> {
+    fn check(&mut self, check: Kind, force: f64, pressure: f64) -> Result<Option<String>> {
         let made = checks::all(&self.spec, force, pressure, self.bench.clock());
-        let seconds = check.seconds() + crate::criteria::HANDLING_S;
+        let seconds = crate::step::check_seconds(check);
         self.act(BenchStep::Rest { seconds }, false)?;
-        Ok(made.into_iter().find(|c| c.name == check.file()).map(|c| c.csv))
+        Ok(made.into_iter().find(|c| c.name == check.file_name()).map(|c| c.csv))
     }
 }

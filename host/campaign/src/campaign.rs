@@ -17,8 +17,9 @@ use crate::course::Course;
 use crate::criteria::{REPEATS, TOP_SHARE};
 use crate::engine::{Decision, Engine};
 use crate::journal::{Chosen, Completion, Event, Journal, unix_seconds};
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
 use crate::watch::{Limits, Spoiled, Watch};
+use pam_fit::checks;
 
 /// One step of the course, as it went.
 #[derive(Debug, Clone, PartialEq)]
@@ -196,10 +197,10 @@ fn one_check(
     actuation: &mut dyn Actuation,
     sink: &mut dyn Sink,
     chosen: &Chosen,
-    check: CheckKind,
+    check: checks::Kind,
 ) -> Result<Done> {
     let (force, top) = (engine.places().blocked, engine.places().top);
-    let name = format!("{:02}_{}.csv", chosen.number, check.file());
+    let name = format!("{:02}_{}.csv", chosen.number, check.file_name());
     let table = actuation.check(check, force, top)?;
     let path = table.map(|csv| sink.table(&name, &csv)).transpose()?.flatten();
     let end_s = actuation.clock();

@@ -11,8 +11,8 @@ use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use crate::actuation::{Actuation, Ending, Reading};
 use crate::course::{Course, Segment, duration};
 use crate::criteria::SAMPLE_HZ;
-use crate::step::CheckKind;
 use crate::stroke_axis::StrokeAxis;
+use pam_fit::checks;
 
 /// Telemetry in a second of device time: twice the recording's rate, so that a stroke ends soon after the muscle is free.
 const TELEMETRY_HZ: f64 = 2.0 * SAMPLE_HZ;
@@ -24,7 +24,7 @@ const AXIS_RESTS_S: f64 = 0.1;
 const RETURN_S: f64 = 5.0;
 
 /// Makes the table of a check at a force (N), a pressure (Pa) and a clock (s); `None` where it cannot be made.
-pub type MakeCheck = Box<dyn FnMut(CheckKind, f64, f64, f64) -> Result<Option<String>>>;
+pub type MakeCheck = Box<dyn FnMut(checks::Kind, f64, f64, f64) -> Result<Option<String>>>;
 
 /// A controller, what moves the free end, and who makes checks of the bench.
 pub struct Controller {
@@ -223,11 +223,11 @@ impl Actuation for Controller {
         Ok(if ended.get() { Ending::Ended } else { Ending::Whole })
     }
 
-    fn check(&mut self, check: CheckKind, force: f64, pressure: f64) -> Result<Option<String>> {
+    fn check(&mut self, check: checks::Kind, force: f64, pressure: f64) -> Result<Option<String>> {
         let clock = self.clock();
         let table = (self.checks)(check, force, pressure, clock)?;
         if table.is_some() {
-            let seconds = check.seconds() + crate::criteria::HANDLING_S;
+            let seconds = crate::step::check_seconds(check);
             self.clock += seconds;
             self.ahead = self.ahead.map(|ahead| ahead + seconds);
         }

@@ -21,9 +21,10 @@ use crate::menu::{menu, opening};
 use crate::places::Places;
 pub use crate::purpose::Purpose;
 use crate::rig::Rig;
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
 use crate::watch::Spoiled;
 use crate::wording;
+use pam_fit::checks;
 
 /// What to do next.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +49,7 @@ pub struct Engine {
     steps: Vec<Step>,
     left_out: Vec<Step>,
     recordings: Vec<Recording>,
-    checks: Vec<(CheckKind, PathBuf)>,
+    checks: Vec<(checks::Kind, PathBuf)>,
     findings: Option<Findings>,
     diagnosis: Option<Diagnosis>,
     since_diagnosis: usize,
@@ -235,7 +236,7 @@ impl Engine {
     }
 
     /// Takes a check of the bench.
-    pub fn add_check(&mut self, check: CheckKind, file: PathBuf) {
+    pub fn add_check(&mut self, check: checks::Kind, file: PathBuf) {
         self.steps.push(Step::Check { check });
         self.checks.push((check, file));
         // It may settle everything.

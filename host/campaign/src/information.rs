@@ -24,7 +24,8 @@ use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROW
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
+use pam_fit::checks;
 
 /// Time between two steps that a design assumes, s.
 const PAUSE_S: f64 = 10.0;
@@ -47,7 +48,7 @@ pub struct Knowledge<'a> {
     /// Sets of effects among which the diagnosis cannot decide; each holds a name that it gave, and those confusable with it.
     pub sets: &'a [Vec<Hypothesis>],
     /// Checks of the bench that were made.
-    pub checked: &'a [CheckKind],
+    pub checked: &'a [checks::Kind],
 }
 
 /// What a step is expected to tell, nats.
@@ -157,7 +158,7 @@ impl<'a> Design<'a> {
         (rms(&seen.before.errors), self.doubts(&seen.before, &seen, &[]))
     }
 
-    fn of_check(&self, check: CheckKind) -> Gain {
+    fn of_check(&self, check: checks::Kind) -> Gain {
         let mut gain = Gain::default();
         for set in self.known.sets {
             let apart = |i: usize, j: usize| {
@@ -168,7 +169,7 @@ impl<'a> Design<'a> {
         if let Some(seen) = Seen::of(self, None) {
             gain.error_before = rms(&seen.before.errors);
             gain.error_after = gain.error_before;
-            let doubts = |more: &[CheckKind]| self.doubts(&seen.before, &seen, more);
+            let doubts = |more: &[checks::Kind]| self.doubts(&seen.before, &seen, more);
             gain.unseen = self.share() * less(&doubts(&[]), &doubts(&[check]));
         }
         gain
@@ -208,7 +209,7 @@ impl<'a> Design<'a> {
 
     /// For each effect, the expected entropy of the set if it were present at the target size: among nothing and all others, whose sizes and
     /// shapes are free beside the table. Effects that a check of the bench settles are not competing candidates, and have none.
-    fn doubts(&self, view: &View, seen: &Seen<'_>, more: &[CheckKind]) -> Vec<f64> {
+    fn doubts(&self, view: &View, seen: &Seen<'_>, more: &[checks::Kind]) -> Vec<f64> {
         let (m, left) = (self.table.len(), &view.left);
         let size = (EFFECT_SIZE * self.known.blocked).powi(2);
         let settled = |law: Candidate| {

@@ -5,7 +5,8 @@ use pam_protocol::{Place, Protocol, Step as ProtocolStep};
 use crate::course::{Course, Segment};
 use crate::criteria::SAMPLE_HZ;
 use crate::places::Places;
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
+use pam_fit::checks;
 
 /// Speed at which the free end returns to rest length while nothing is recorded, mm/s.
 const RETURN_MM_S: f64 = 2.0;
@@ -131,30 +132,30 @@ fn sentence(segment: &Segment, places: &Places) -> String {
     }
 }
 
-fn of_check(check: CheckKind) -> Vec<String> {
+fn of_check(check: checks::Kind) -> Vec<String> {
     let lines: &[&str] = match check {
-        CheckKind::DeadWeights => &[
+        checks::Kind::DeadWeights => &[
             "Take the muscle out.",
             "Hang at least three known weights on the load cell, each for some seconds, up to the force of the muscle: once with the air \
              line vented, once under pressure.",
             "Record time_, force_, reference_force_ and pressure_.",
         ],
-        CheckKind::RigidBar => &[
+        checks::Kind::RigidBar => &[
             "Put a rigid bar in the place of the muscle.",
             "Pull and push slowly, up to the force of the muscle.",
             "Record time_, displacement_, force_ and reference_displacement_.",
         ],
-        CheckKind::ReferenceGauge => &[
+        checks::Kind::ReferenceGauge => &[
             "Connect a more accurate gauge beside that of the bench.",
             "Set at least three pressures, each for some seconds.",
             "Record time_, pressure_ and reference_pressure_.",
         ],
-        CheckKind::Weighing => &[
+        checks::Kind::Weighing => &[
             "Vent the muscle. Read the load cell with the muscle and its fittings attached, and with nothing attached: in turn, at least \
              twice each, each for some seconds.",
             "Record time_, force_ and attached, which is 1 or 0.",
         ],
-        CheckKind::ClosedValve => &[
+        checks::Kind::ClosedValve => &[
             "Hold the muscle at rest length at the highest pressure, and wait until pressure and force are steady.",
             "Close the valve between supply and gauge for half a minute, and open it again: at least three times.",
             "Record time_, pressure_ and valve_closed, which is 1 or 0.",

@@ -15,7 +15,7 @@ use pam_data::error::{DataCode, Error, Result};
 
 pub use self::event::{Chosen, Event};
 use crate::actuation::Reading;
-use crate::step::CheckKind;
+use pam_fit::checks;
 
 mod event;
 
@@ -205,7 +205,7 @@ impl Journal {
 
     /// Checks of the bench that were made.
     #[must_use]
-    pub fn checks(&self) -> Vec<(CheckKind, PathBuf)> {
+    pub fn checks(&self) -> Vec<(checks::Kind, PathBuf)> {
         let made = self.events.iter().filter_map(|e| match e {
             Event::Checked { check, file, .. } => Some((*check, self.folder.join(file))),
             _ => None,

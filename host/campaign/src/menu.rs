@@ -3,7 +3,8 @@
 use crate::criteria::{FIRST_TARE, SURVEY_SPEED};
 use crate::places::Places;
 use crate::rig::{Axis, Rig};
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
+use pam_fit::checks;
 
 /// Every step that the rig can do, in a fixed order.
 #[must_use]
@@ -34,7 +35,7 @@ pub fn menu(places: &Places, rig: &Rig) -> Vec<Step> {
     }
     steps.push(Step::Tare { seconds: 10.0 });
     if rig.checks {
-        steps.extend(CheckKind::ALL.map(|check| Step::Check { check }));
+        steps.extend(checks::Kind::ALL.map(|check| Step::Check { check }));
     }
     steps
 }

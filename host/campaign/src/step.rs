@@ -1,7 +1,6 @@
 //! The menu of steps: what can be done with the muscle, as plain data.
 
-use pam_fit::bench::Candidate;
-use pam_fit::checks::Kind;
+use pam_fit::checks;
 use serde::{Deserialize, Serialize};
 
 use crate::course::{Course, Segment, VENT_S};
@@ -76,79 +75,20 @@ pub enum Step {
     /// A check of the bench without the muscle.
     Check {
         /// Which.
-        check: CheckKind,
+        check: checks::Kind,
     },
 }
 
-/// Checks that a campaign can ask for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CheckKind {
-    /// Known weights on the load cell.
-    DeadWeights,
-    /// A rigid bar in the muscle's place.
-    RigidBar,
-    /// A better gauge beside the bench's own.
-    ReferenceGauge,
-    /// The load cell with and without muscle and fittings.
-    Weighing,
-    /// The muscle under pressure behind a closed valve.
-    ClosedValve,
-}
-
-impl CheckKind {
-    /// All.
-    pub const ALL: [Self; 5] =
-        [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge, Self::Weighing, Self::ClosedValve];
-
-    /// The kind of a check that was made.
-    #[must_use]
-    pub const fn of_made(kind: Kind) -> Self {
-        match kind {
-            Kind::DeadWeights => Self::DeadWeights,
-            Kind::RigidBar => Self::RigidBar,
-            Kind::ReferenceGauge => Self::ReferenceGauge,
-            Kind::Weighing => Self::Weighing,
-            Kind::ClosedValve => Self::ClosedValve,
-        }
-    }
-
-    /// Whether the check measures an effect, so that no motion needs to show it.
-    #[must_use]
-    pub fn settles(self, effect: Candidate) -> bool {
-        let kind = match self {
-            Self::DeadWeights => Kind::DeadWeights,
-            Self::RigidBar => Kind::RigidBar,
-            Self::ReferenceGauge => Kind::ReferenceGauge,
-            Self::Weighing => Kind::Weighing,
-            Self::ClosedValve => Kind::ClosedValve,
-        };
-        kind.settles(effect)
-    }
-
-    /// Name of its file, without extension.
-    #[must_use]
-    pub const fn file(self) -> &'static str {
-        match self {
-            Self::DeadWeights => "dead_weights",
-            Self::RigidBar => "rigid_bar",
-            Self::ReferenceGauge => "gauge_check",
-            Self::Weighing => "weighing",
-            Self::ClosedValve => "closed_valve",
-        }
-    }
-
-    /// Its recording, s, as the virtual bench makes it; handling comes on top.
-    #[must_use]
-    pub const fn seconds(self) -> f64 {
-        match self {
-            Self::DeadWeights => 84.0,
-            Self::RigidBar => 120.0,
-            Self::ReferenceGauge => 60.0,
-            Self::Weighing => 48.0,
-            Self::ClosedValve => 72.0,
-        }
-    }
+/// How long a check takes, s: its recording, as the virtual bench makes it, and its handling.
+pub(crate) const fn check_seconds(check: checks::Kind) -> f64 {
+    let recording = match check {
+        checks::Kind::DeadWeights => 84.0,
+        checks::Kind::RigidBar => 120.0,
+        checks::Kind::ReferenceGauge => 60.0,
+        checks::Kind::Weighing => 48.0,
+        checks::Kind::ClosedValve => 72.0,
+    };
+    recording + HANDLING_S
 }
 
 impl Step {
@@ -168,7 +108,7 @@ impl Step {
             Self::Ramps { part } => format!("ramps_{:02.0}percent", 100.0 * part),
             Self::Staircase { part, .. } => format!("staircase_{:02.0}percent", 100.0 * part),
             Self::Rest { level, .. } => format!("rested_{}", kpa(level)),
-            Self::Check { check } => check.file().into(),
+            Self::Check { check } => check.file_name().into(),
         }
     }
 
@@ -203,11 +143,15 @@ impl Step {
                 format!("a vented rest of {:.0} s, then a slow stroke at {}", seconds, kpa(level))
             }
             Self::Check { check } => match check {
-                CheckKind::DeadWeights => "a check of the load cell with dead weights".into(),
-                CheckKind::RigidBar => "a check of the frame with a rigid bar".into(),
-                CheckKind::ReferenceGauge => "a check of the pressure sensor with a reference gauge".into(),
-                CheckKind::Weighing => "a check of the load cell with and without muscle and fittings".into(),
-                CheckKind::ClosedValve => "a check of the muscle for a leak behind a closed valve".into(),
+                checks::Kind::DeadWeights => "a check of the load cell with dead weights".into(),
+                checks::Kind::RigidBar => "a check of the frame with a rigid bar".into(),
+                checks::Kind::ReferenceGauge => {
+                    "a check of the pressure sensor with a reference gauge".into()
+                }
+                checks::Kind::Weighing => {
+                    "a check of the load cell with and without muscle and fittings".into()
+                }
+                checks::Kind::ClosedValve => "a check of the muscle for a leak behind a closed valve".into(),
             },
         }
     }
@@ -271,7 +215,7 @@ impl Step {
     #[must_use]
     pub fn seconds(&self, places: &Places) -> f64 {
         match self {
-            Self::Check { check } => check.seconds() + HANDLING_S,
+            Self::Check { check } => check_seconds(*check),
             _ => {
                 let moves = if places.by_hand { f64::from(self.positions()) * HANDLING_S } else { 0.0 };
                 self.course(places).seconds() + moves

@@ -30,6 +30,8 @@ mod weighing;
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use crate::bench::{BenchName, Candidate};
 use crate::numerics::student::{effective_freedom, half_width};
 use pam_data::error::Result;
@@ -39,7 +41,8 @@ pub use closed_valve::Loss;
 use table::Table;
 
 /// A kind of check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Known weights on the load cell.
     DeadWeights,
@@ -54,6 +57,22 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// All.
+    pub const ALL: [Self; 5] =
+        [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge, Self::Weighing, Self::ClosedValve];
+
+    /// Name of its file, without extension.
+    #[must_use]
+    pub const fn file_name(self) -> &'static str {
+        match self {
+            Self::DeadWeights => "dead_weights",
+            Self::RigidBar => "rigid_bar",
+            Self::ReferenceGauge => "gauge_check",
+            Self::Weighing => "weighing",
+            Self::ClosedValve => "closed_valve",
+        }
+    }
+
     /// Whether the check measures an effect of the catalogue, so that recordings need not show it.
     #[must_use]
     pub fn settles(self, effect: Candidate) -> bool {

@@ -77,7 +77,7 @@ pub(crate) fn emulated(
     limit(&mut rig, &mut client)?;
     let made: MakeCheck = Box::new(move |check, force, pressure, clock| {
         let made = checks::all(&bench, force, pressure, clock);
-        Ok(made.into_iter().find(|c| c.name == check.file()).map(|c| c.csv))
+        Ok(made.into_iter().find(|c| c.name == check.file_name()).map(|c| c.csv))
     });
     let words = emulated.description();
     let controller = Controller::new(client, Box::new(axis.clone()), made);

@@ -20,12 +20,12 @@ use pam_campaign::campaign::{Done, Outcome, run};
 use pam_campaign::engine::{Engine, Purpose};
 use pam_campaign::journal::Journal;
 use pam_campaign::rig::Rig;
-use pam_campaign::step::CheckKind;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::output::write_whole;
 use pam_device::emulated::Kind;
 use pam_device::error::DeviceCode;
 use pam_device::run::vent;
+use pam_fit::checks;
 
 /// Arguments of `host campaign`.
 #[derive(Debug, Args)]
@@ -223,7 +223,7 @@ impl Arguments {
             .filter_map(|f| Some(f.ok()?.path()))
             .filter(|p| {
                 let name = p.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                let check = CheckKind::ALL.iter().any(|c| name.contains(c.file()));
+                let check = checks::Kind::ALL.iter().any(|c| name.contains(c.file_name()));
                 name.ends_with(".csv") && !check
             })
             .collect();

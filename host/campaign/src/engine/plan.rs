@@ -13,8 +13,9 @@ use crate::information::{Gain, expected};
 use crate::menu::opening;
 use crate::purpose::Purpose;
 use crate::rig::Rig;
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
 use crate::wording;
+use pam_fit::checks;
 
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +51,7 @@ impl Engine {
         mut rig: Rig,
         purpose: Purpose,
         recordings: Vec<Recording>,
-        checks: Vec<(CheckKind, PathBuf)>,
+        checks: Vec<(checks::Kind, PathBuf)>,
     ) -> Result<Self> {
         if muscle.max_pressure().is_none() && rig.pressure_max_kpa.is_none() {
             // What was recorded was allowed.

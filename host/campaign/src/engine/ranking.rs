@@ -13,8 +13,9 @@ use crate::criteria::{INDEPENDENT_S, INEXACTNESS, NAMED, SURE, WANTED_ERROR, WOR
 use crate::information::{Design, Gain, Knowledge};
 use crate::menu::menu;
 use crate::purpose::Purpose;
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
 use crate::wording;
+use pam_fit::checks;
 
 /// A step and what it is expected to tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +58,7 @@ impl Engine {
         let open = self.diagnosis.as_ref().map(sets).unwrap_or_default();
         let constant_force = open.iter().flatten().any(|h| settles(h.law));
         let follows = |step: &Step| {
-            if *step == (Step::Check { check: CheckKind::Weighing }) && !constant_force {
+            if *step == (Step::Check { check: checks::Kind::Weighing }) && !constant_force {
                 return false;
             }
             let again = match step {
@@ -86,7 +87,7 @@ impl Engine {
             Step::Check { check } => Some(check),
             _ => None,
         });
-        let checked: Vec<CheckKind> = self.checks.iter().map(|c| c.0).chain(planned_checks).collect();
+        let checked: Vec<checks::Kind> = self.checks.iter().map(|c| c.0).chain(planned_checks).collect();
         let expected: Vec<Recording> = planned.iter().filter_map(|p| p.1.clone()).collect();
         let past = match expected.as_slice() {
             [] => Cow::Borrowed(self.recordings.as_slice()),

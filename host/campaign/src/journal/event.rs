@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::step::{CheckKind, Step};
+use crate::step::Step;
 use crate::watch::Spoiled;
+use pam_fit::checks;
 
 /// Why a step was chosen and what was expected of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,7 +87,7 @@ pub enum Event {
         /// Number of the step.
         number: u32,
         /// Which.
-        check: CheckKind,
+        check: checks::Kind,
         /// Its file.
         file: String,
         /// Clock at its end, s.

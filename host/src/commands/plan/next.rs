@@ -10,12 +10,11 @@ use pam_campaign::analysis::names;
 use pam_campaign::engine::{Engine, Plan, Planned};
 use pam_campaign::instructions::{instructions, protocol};
 use pam_campaign::rig::Rig;
-use pam_campaign::step::CheckKind;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::write_whole;
 use pam_data::recording::{Import, Reader};
-use pam_fit::checks::Kind;
+use pam_fit::checks;
 
 /// The page of a plan.
 const PAGE: &str = "plan.md";
@@ -42,7 +41,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let checks = arguments
         .check
         .iter()
-        .map(|file| Ok((CheckKind::of_made(Kind::of(file)?), file.clone())))
+        .map(|file| Ok((checks::Kind::of(file)?, file.clone())))
         .collect::<Result<Vec<_>>>()?;
     let (purpose, purpose_name) = arguments.purpose.purpose();
     let count = recordings.len();

@@ -11,11 +11,12 @@ use pam_campaign::engine::{Engine, Purpose};
 use pam_campaign::menu::{menu, opening};
 use pam_campaign::places::Places;
 use pam_campaign::rig::Rig;
-use pam_campaign::step::{CheckKind, Step};
+use pam_campaign::step::Step;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 use pam_diagnose::next_experiment::next_experiment;
 use pam_diagnose::verdict::Considered;
+use pam_fit::checks;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use virtual_bench::bench::Bench;
@@ -192,7 +193,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
     let mut bench = VirtualBench::new(&made.truth.bench);
     let mut r = Rng::stream(spec.seed, "random menu");
     let (mut recordings, mut checks) = (Vec::new(), Vec::new());
-    let mut made_checks: Vec<CheckKind> = Vec::new();
+    let mut made_checks: Vec<checks::Kind> = Vec::new();
     let mut number = 0;
     loop {
         let begin = opening(&rig());
@@ -213,7 +214,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
         number += 1;
         if let Step::Check { check } = step {
             if let Some(csv) = bench.check(check, places.blocked, places.top).map_err(message)? {
-                checks.push(written(&folder.0, check.file(), &csv)?);
+                checks.push(written(&folder.0, check.file_name(), &csv)?);
             }
             made_checks.push(check);
             continue;
