@@ -1,35 +1,35 @@
 //! The force reading is late against stroke and pressure.
 //!
 //! ```text
-//! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − D_τ(F)),  D_τ = LP⁴_{τ/4}
+//! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − F(t − τ))
 //! ```
 //! `δ`, s, a skew between the channels, to first order and away from reversals (negative: the stroke is the late one); or a first-order filter
-//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at reversals; or a delay by `τ` behind a
-//! converter's filter: four equal filters in a row, which bring a jump late and not immediately. `F`, N, is the base model's force. Laws to
-//! choose from.
+//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at reversals; or a dead time `τ`, s, of
+//! a converter or a line, which brings a jump late and whole. `F`, N, is the base model's force. Laws to choose from.
 
 use model_core::effects::{
-    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, Memory, Owner, Parameter, Start, Traits,
+    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, MEMORY, Memory, Owner, Parameter, Start,
+    Traits,
 };
 use model_core::scalar::Scalar;
 
 type Filter = Fading<1, 1>;
-/// Filters in a row behind a delay.
-const ROW: usize = 4;
-/// A step goes through the row in pieces, at most this many, as the input of each filter bends within the step.
-const PIECES: usize = 12;
-/// Where they begin in the memory: whether anything was seen, the force, what each filter gives.
-const SEEN: usize = Filter::SLOTS;
-/// Behind them: which way the muscle went, where it was, how fast.
-const WAY: usize = SEEN + 2 + ROW;
+/// Behind the filter: which way the muscle went, where it was, how fast.
+const WAY: usize = Filter::SLOTS;
 const STROKE: usize = WAY + 1;
 const SPEED: usize = WAY + 2;
+/// Behind them: the number of knots in the recent course of the force, then each knot's age and force, the newest first.
+const COUNT: usize = WAY + 3;
+const FIRST: usize = COUNT + 1;
+const KNOTS: usize = (MEMORY - FIRST) / 2;
+/// The force runs straight between two knots, which are at most this share of the dead time apart where the readings allow it.
+const APART: f64 = 0.25;
 
 /// See the [module](self).
 pub(super) struct SensorDelay;
 
 impl Effect for SensorDelay {
-    // memory: see Fading, one time constant, the force as drive; then the row of filters
+    // memory: see Fading, one time constant, the force as drive; then the recent course of the force
     const INFO: Info = Info {
         name: "sensor-delay",
         link: Link::Reading,
@@ -44,9 +44,9 @@ impl Effect for SensorDelay {
         alternatives: true,
         start: Start::Settled,
         fading: &[],
-        equation: "F = −δ·(∂F/∂x·v + g·(1 − s·k_F)·dP/dt), or F = −κ·(F − LP_τ(F)), or F = −κ_d·(F − D_τ(F))",
+        equation: "F = −δ·(∂F/∂x·v + g·(1 − s·k_F)·dP/dt), or F = −κ·(F − LP_τ(F)), or F = −κ_d·(F − F(t − τ))",
         summary: "The force channel lags behind the other channels.",
-        source: "first-order filter or skew; 1 to 100 ms are usual",
+        source: "first-order filter, skew or dead time; 1 to 100 ms are usual",
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::Speeds)
@@ -62,7 +62,8 @@ impl Effect for SensorDelay {
         match turn(context, memory) {
             Some(turn) => {
                 catch_up(memory, time, (context.dt - turn.since).max(T::ZERO), turn.before);
-                catch_up(memory, time, T::ZERO, turn.after);
+                Filter::step(memory, T::ZERO, &[time], &[turn.after]);
+                add(memory, turn.after);
                 catch_up(memory, time, turn.since, context.force());
             }
             None => catch_up(memory, time, context.dt, context.force()),
@@ -75,8 +76,8 @@ impl Effect for SensorDelay {
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let rate = context.slope() * context.speed + context.pull_per_pressure() * context.pressure_rate;
         let filtered = Filter::value(memory, 0, context.force());
-        let delayed =
-            if memory[SEEN] == T::ZERO { T::ZERO } else { context.force() - memory[SEEN + 1 + ROW] };
+        let now = context.force();
+        let delayed = now - before(memory, parameters[3]).unwrap_or(now);
         -(parameters[0] * rate + parameters[1] * filtered + parameters[2] * delayed)
     }
 }
@@ -106,32 +107,53 @@ fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> 
     Some(Turn { since, before: going(came), after: going(context.direction) })
 }
 
-/// Lets `dt` seconds pass in both kinds of filter, while the force ran straight to `force`.
+/// Lets `dt` seconds pass in the filter and in the course of the force, which ran straight to `force`.
 fn catch_up<T: Scalar>(memory: &mut Memory<T>, time: T, dt: T, force: T) {
     Filter::step(memory, dt, &[time], &[force]);
-    if memory[SEEN] == T::ZERO {
-        memory[SEEN] = T::ONE;
-        memory[SEEN + 1..SEEN + 2 + ROW].fill(force);
-        return;
+    let n = count(memory);
+    for k in 0..n {
+        memory[age(k)] += dt;
     }
-    let row = &mut memory[SEEN + 1..SEEN + 2 + ROW];
-    let time = time.max(T::from_f32(1.0e-4)) / T::from_f64(ROW as f64);
-    let dt = dt.max(T::ZERO);
-    let pieces = (1..PIECES).find(|n| dt <= time * T::from_f64(0.5 * *n as f64)).unwrap_or(PIECES);
-    let part = T::ONE / T::from_f64(pieces as f64);
-    let (dt, began) = (dt * part, row[0]);
-    let kept = (-dt / time).exp();
-    // Exact where the input runs straight between two moments.
-    let mean = if dt > T::ZERO { (T::ONE - kept) * time / dt } else { T::ONE };
-    for piece in 1..=pieces {
-        let mut input = (row[0], began + (force - began) * part * T::from_f64(piece as f64));
-        row[0] = input.1;
-        for output in &mut row[1..] {
-            let before = *output;
-            *output = kept * before + (T::ONE - mean) * input.1 + (mean - kept) * input.0;
-            input = (before, *output);
-        }
+    // Knots older than the first one that is as old as the dead time have no use.
+    while count(memory) > 1 && memory[age(count(memory) - 2)] >= time {
+        memory[COUNT] -= T::ONE;
     }
+    // The newest knot moves along with the force, except from a jump, and until it is far from the one before it.
+    let follows =
+        count(memory) > 1 && memory[age(1)] > memory[age(0)] && memory[age(1)] <= time * T::from_f64(APART);
+    if follows {
+        (memory[age(0)], memory[age(0) + 1]) = (T::ZERO, force);
+    } else {
+        add(memory, force);
+    }
+}
+
+/// Adds a knot of age zero; where there is no room, the oldest one goes.
+fn add<T: Scalar>(memory: &mut Memory<T>, force: T) {
+    let n = count(memory).min(KNOTS - 1);
+    memory.copy_within(FIRST..age(n), age(1));
+    (memory[age(0)], memory[age(0) + 1]) = (T::ZERO, force);
+    memory[COUNT] = T::from_f64((n + 1) as f64);
+}
+
+fn count<T: Scalar>(memory: &Memory<T>) -> usize {
+    (0..KNOTS).take_while(|k| T::from_f64(*k as f64) < memory[COUNT]).count()
+}
+
+/// Where the age of a knot is kept; its force is behind it.
+const fn age(knot: usize) -> usize {
+    FIRST + 2 * knot
+}
+
+/// The force a dead time ago; before the first knot it was as there. `None` before anything was seen.
+fn before<T: Scalar>(memory: &Memory<T>, time: T) -> Option<T> {
+    let n = count(memory);
+    let older = (0..n).find(|k| memory[age(*k)] >= time).or(n.checked_sub(1))?;
+    let newer = older.saturating_sub(1);
+    let (from, to) = (age(newer), age(older));
+    let span = memory[to] - memory[from];
+    let part = if span > T::ZERO { ((time - memory[from]) / span).min(T::ONE) } else { T::ONE };
+    Some(memory[from + 1] + part * (memory[to + 1] - memory[from + 1]))
 }
 
 /// No filter passes more than it is given: its parts are 1 at most, and 1.3 with their error.
@@ -183,6 +205,20 @@ mod tests {
                 let off = coarse - fine[100 * i];
                 // The jump at a reversal is up to 160 N; the rest are the slopes on either side of it, over a part of a sample.
                 assert!(off.abs() < 1.5, "{law:?}, {i}: {coarse} and {}", fine[100 * i]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_dead_time_brings_each_reversal_late_and_whole() {
+        for (every, time) in [(1, 0.06), (20, 0.06), (20, 0.013), (50, 0.41)] {
+            let dt = 1e-3 * every as f64;
+            for (i, added) in
+                added(&[0.0, 0.0, 1.0, time], every).iter().enumerate().skip(1 + (time / dt) as usize)
+            {
+                let now = dt * i as f64;
+                let late = moment(now - time, dt).force() - moment(now, dt).force();
+                assert!((added - late).abs() < 0.1, "{time} s, {i}: {added} and {late}");
             }
         }
     }
