@@ -1,10 +1,9 @@
 //! Laws that replace a part of the base model, seen from a base that was fitted beside them.
 //!
-//! A play, or a friction that builds up over a distance, is a law in the base's own slope and friction. A base that was fitted without it
+//! A play, a late reading, or a friction that builds up over a distance, is a law in the base's own slope and friction. A base that was fitted without it
 //! has taken up a part of it: the friction of a loose joint's muscle then reads far too large, and the law, made from that friction, fits
 //! badly and has a wrong width. Therefore each width is tried about a base that was fitted beside it, and once more about the base beside the best.
 
-use model_core::effects::Start;
 use rayon::prelude::*;
 
 use super::baselines::{self, Kind};
@@ -25,8 +24,7 @@ pub(super) fn renew(
     let taken = |fit: &CandidateFit| chosen.iter().any(|c| c.candidate == fit.candidate);
     for fit in best.iter_mut() {
         let candidate = &library[fit.candidate];
-        let remembers = candidate.info.start == Start::Branch && candidate.shapes().next().is_some();
-        if remembers && fit.score >= LEAST_SCORE && !taken(fit) {
+        if candidate.traits.made_from_base && fit.score >= LEAST_SCORE && !taken(fit) {
             let renewed = renewed(fit, chosen, library, rows, scorer);
             if renewed.score > fit.score {
                 *fit = renewed;

@@ -39,7 +39,7 @@ impl Effect for MinorLoopMemory {
         source: "Y. Liu et al., Strojniški vestnik 63 (2017) 56–64, doi 10.5545/sv-jme.2016.4027 (Prandtl–Ishlinskii operators for a pneumatic muscle); P. Krejčí and K. Kuhnen, IEE Proc. Control Theory and Applications 148 (2001) 185–192",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops).changed(
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops).made_from_base().changed(
         Changed::new(Class::TurningMemory, Owner::Muscle, "small loops remember at the reversal")
             .remembering(),
     );

@@ -38,8 +38,10 @@ impl Effect for PreslidingHysteresis {
         source: "F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14 (2004) 446–460, doi 10.1063/1.1741752 (generalized Maxwell slip); T. Vo-Minh et al., Mechatronics 20 (2010) 402–414 (for a pneumatic muscle)",
     };
 
-    const TRAITS: Traits =
-        Traits::shown_by(Experiment::NestedLoops).consistent(no_more_than_the_friction).changed(
+    const TRAITS: Traits = Traits::shown_by(Experiment::NestedLoops)
+        .made_from_base()
+        .consistent(no_more_than_the_friction)
+        .changed(
             Changed::new(Class::TurningMemory, Owner::Muscle, "friction builds up after a reversal")
                 .remembering(),
         );

@@ -37,6 +37,7 @@ impl Effect for SealFriction {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps)
+        .made_from_base()
         .vented(Vented::Everything)
         .changed(Changed::new(Class::Friction, Owner::Muscle, "a rod's seal rubs"));
 

@@ -106,6 +106,9 @@ pub struct Traits {
     pub between_recordings: bool,
     /// Whether closed valves show it: their pressure falls.
     pub loses_air: bool,
+    /// Whether its law is made from the slope and friction of the base model, which a base that was fitted without it has partly taken up:
+    /// it is then seen from a base that was fitted beside it.
+    pub made_from_base: bool,
     /// How a change of it shows between two campaigns; `None` for what no comparison looks for.
     pub changed: Option<Changed>,
     /// Whether amplitudes and shapes that were fitted freely can belong to one and the same cause.
@@ -127,6 +130,7 @@ impl Traits {
             imitates: None,
             between_recordings: false,
             loses_air: false,
+            made_from_base: false,
             changed: None,
             consistent: always,
         }
@@ -155,6 +159,11 @@ impl Traits {
     #[must_use]
     pub const fn loses_air(self) -> Self {
         Self { loses_air: true, ..self }
+    }
+    /// The same, made from the slope and friction of the base model.
+    #[must_use]
+    pub const fn made_from_base(self) -> Self {
+        Self { made_from_base: true, ..self }
     }
     /// The same, mistaken for something that is no effect.
     #[must_use]

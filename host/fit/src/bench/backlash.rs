@@ -38,6 +38,7 @@ impl Effect for Backlash {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::RigidBar)
+        .made_from_base()
         .check(BenchCheck::RigidBar)
         .consistent(no_looser_than_free)
         .changed(Changed::new(Class::Alone(Self::INFO.name), Owner::Rig, "a loose joint").remembering());

@@ -37,6 +37,7 @@ impl Effect for RigCompliance {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::RigidBar)
+        .made_from_base()
         .check(BenchCheck::RigidBar)
         .consistent(gives_alike)
         .changed(Changed::new(Class::Gain, Owner::Rig, "ΔF = c·F·∂F/∂x").sized("compliance", "m/N"));

@@ -3,9 +3,10 @@
 //! ```text
 //! F_add = −δ (∂F/∂x v + g (1 − s k_F) dP/dt)    or    F_add = −κ (F − LP_τ(F))    or    F_add = −κ_d (F − F(t − τ))
 //! ```
-//! `δ`, s, a skew between the channels, to first order and away from reversals (negative: the stroke is the late one); or a first-order filter
-//! of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at reversals; or a dead time `τ`, s, of
-//! a converter or a line, which brings a jump late and whole. `F`, N, is the base model's force. Laws to choose from.
+//! `δ < 0`, s, a skew between the channels, of which the stroke is the late one, to first order and away from reversals; or a first-order
+//! filter of time constant `τ`, s, in the force channel, `κ = 1` for the whole, which also rounds the jumps at reversals; or a dead time `τ`,
+//! s, of a converter or a line, which brings a jump late and whole. `F`, N, is the base model's force. Laws to choose from. A late force is
+//! never described to first order only: away from reversals that would be friction.
 
 use model_core::effects::{
     Changed, Class, Context, Effect, Experiment, Fading, Info, Link, MEMORY, Memory, Owner, Parameter, Start,
@@ -34,7 +35,7 @@ impl Effect for SensorDelay {
         name: "sensor-delay",
         link: Link::Reading,
         parameters: &[
-            Parameter::amplitude("δ", "skew", "s", -0.1, 0.1).bounded(),
+            Parameter::amplitude("δ", "skew", "s", -0.1, 0.0).bounded(),
             Parameter::amplitude("κ", "filtered_part", "", 0.1, 1.2).bounded(),
             Parameter::amplitude("κ_d", "delayed_part", "", 0.1, 1.2).bounded(),
             Parameter::shape("τ", "filter_time", "s", 1.0e-3, 0.5),
@@ -50,6 +51,7 @@ impl Effect for SensorDelay {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::Speeds)
+        .made_from_base()
         .consistent(passes_no_more)
         .changed(Changed::new(Class::SensorDelay, Owner::Sensor, "F(t) = S(P(t − τ))").sized("delay", "s"));
 
