@@ -226,9 +226,18 @@ fn a_reading_now_and_then_late_at_a_turn_is_no_physics() {
 }
 
 #[test]
-fn a_cell_two_samples_late_is_distinguished_from_a_loose_joint() {
-    let d = ask(&delayed(recorded(loops(&[0.2]), 4, coloured(0.1, 2.0), |_, _, _| 0.0), |_| 2));
-    assert_eq!(names(&d).first(), Some(&"sensor-delay"), "{:?}", names(&d));
+fn a_late_cell_is_distinguished_from_a_loose_joint_and_its_dead_time_found() {
+    for late in [2, 4] {
+        let d = ask(&delayed(recorded(loops(&[0.2]), 4, coloured(0.1, 2.0), |_, _, _| 0.0), |_| late));
+        assert_eq!(names(&d), ["sensor-delay"], "{late} samples");
+        let of = |name: &str| d.missing[0].parameters.iter().find(|p| p.name == name).map(|p| p.value);
+        let (part, time) = (of("delayed_part").unwrap_or(0.0), of("filter_time").unwrap_or(0.0));
+        let truth = 0.1 * late as f64;
+        assert!(
+            (part - 1.0).abs() < 0.1 && (time - truth).abs() < 0.1 * truth,
+            "{part} of it {time} s, not {truth} s, late"
+        );
+    }
 }
 
 #[test]

@@ -7,13 +7,17 @@
 //! that is free over all of `b`, less if it is tight at times. A preloaded joint has none. The side on which the play begins is
 //! unknown until the first turn. While the joint is
 //! loose the muscle rests, and its friction keeps the direction `s_y` of its own last motion; once it is drawn along again, that turns
-//! over a travel of `η b`, as the joint does not bear all at once and the braid gives a little before it slides.
+//! over a travel of `η b`, as the joint does not bear all at once and the braid gives a little before it slides. What fills or empties
+//! the muscle between two recordings turns its friction, too.
 
 use model_core::effects::{
     BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
     Traits, decay,
 };
 use model_core::scalar::Scalar;
+
+/// A pressure that changes by more than this part from one reading to the next was changed between two recordings.
+const REFILLED: f64 = 0.05;
 
 /// See the [module](self).
 pub(super) struct Backlash;
@@ -44,7 +48,7 @@ impl Effect for Backlash {
         .changed(Changed::new(Class::Alone(Self::INFO.name), Owner::Rig, "a loose joint").remembering());
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
-        // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play, last direction]
+        // memory: [play(x) − x, last stroke, seen, direction of the muscle behind the play, last direction, last pressure]
         let half = (parameters[1] * T::from_f32(0.5)).max(T::ZERO);
         let moved = if memory[2] == T::ZERO { T::ZERO } else { context.stroke - memory[1] };
         let behind = memory[0] - moved;
@@ -59,9 +63,15 @@ impl Effect for Backlash {
             // What turns friction at held length is pressure, which the muscle feels behind a loose joint as well.
             memory[3] = (memory[3] + context.direction - memory[4]).clamp(-T::ONE, T::ONE);
         }
+        let (before, now) = (memory[5], context.pressure);
+        let refilled = (now - before).abs() > T::from_f64(REFILLED) * before.max(now);
+        if refilled && memory[2] != T::ZERO {
+            memory[3] = if now > before { T::ONE } else { -T::ONE };
+        }
         memory[1] = context.stroke;
         memory[2] = T::ONE;
         memory[4] = context.direction;
+        memory[5] = context.pressure;
     }
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
