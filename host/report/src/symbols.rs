@@ -64,7 +64,6 @@ const SYMBOLS: &[(&str, &str)] = &[
     ("W", "stretch of the rubber, I₁ − 3"),
     ("W_m", "the largest W so far"),
     ("LP_τ", "first-order low-pass filter with time constant τ"),
-    ("D_τ", "four such filters in series, each of τ/4: close to a delay by τ"),
 ];
 
 /// The symbols with their indices, without powers and numbers before them.

@@ -93,17 +93,19 @@ struct Turn<T> {
     after: T,
 }
 
-/// The reversal since the last sample, if any: where the strokes before and after it meet, each extrapolated at its speed.
+/// The reversal since the last sample, if any: where the strokes before and after it meet, each extrapolated at its speed; halfway if they
+/// do not move towards it.
 fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> {
     let came = memory[WAY];
     let (speed, dt) = (memory[SPEED], context.dt);
     let ways = came * context.direction < T::ZERO;
     let speeds = speed * came > T::ZERO && context.speed * context.direction > T::ZERO;
-    if !(ways && speeds) {
+    if !ways {
         return None;
     }
-    let until = (context.stroke - memory[STROKE] - context.speed * dt) / (speed - context.speed);
-    let since = dt - until.max(T::ZERO).min(dt);
+    let meet = (context.stroke - memory[STROKE] - context.speed * dt) / (speed - context.speed);
+    let until = if speeds { meet.max(T::ZERO).min(dt) } else { dt * T::from_f32(0.5) };
+    let since = dt - until;
     let pull = context.quasi - context.stiffness * context.speed * since;
     let going = |way: T| Context { direction: way, ..*context }.rubbed(pull);
     Some(Turn { since, before: going(came), after: going(context.direction) })
