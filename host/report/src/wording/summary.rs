@@ -6,6 +6,7 @@ use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict};
 use pam_diagnose::why::Why;
 
+use super::outcome::small_rest;
 use super::{
     HALF_95, HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split,
     why, with_interval,
@@ -98,6 +99,13 @@ fn header(s: &mut String, d: &Diagnosis) {
     } else {
         writeln!(s, "{}: {} rows", d.muscle, d.samples)
     };
+    let explained = match small_rest(d) {
+        None => "EXPLAINED: the effects below explain the model's error above the noise.".to_owned(),
+        Some(share) => format!(
+            "EXPLAINED: the effects below explain {share:.0} % of the model's error above the noise; the rest is within the model's \
+             stated inexactness."
+        ),
+    };
     let _ = writeln!(
         s,
         "\n{}",
@@ -110,7 +118,7 @@ fn header(s: &mut String, d: &Diagnosis) {
                 "CONSISTENT: no error exceeds the noise and the model's stated inexactness.",
             Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
                 "AS GIVEN: with the effects that were given, no error exceeds the noise. The recordings do not support all of them.",
-            Verdict::Explained => "EXPLAINED: the effects below explain the model's error above the noise.",
+            Verdict::Explained => &explained,
             Verdict::PartlyExplained =>
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
             Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) =>
