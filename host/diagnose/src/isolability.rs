@@ -80,7 +80,8 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
             let mut sum = vec![0.0; keep.len()];
             let parts = if law.info().alternatives { 1 } else { columns.len() };
             for (p, c) in law.amplitudes().iter().zip(&columns).take(parts) {
-                let typical = (p.low.abs().max(p.high.abs() * 1e-3) * p.high.abs()).sqrt();
+                let (least, most) = if p.high > 0.0 { (p.low, p.high) } else { (p.high, p.low) };
+                let typical = (least.abs().max(most.abs() * 1e-3) * most.abs()).sqrt();
                 for (s, i) in sum.iter_mut().zip(&keep) {
                     *s += typical * if c[*i].is_finite() { c[*i] } else { 0.0 };
                 }

@@ -210,7 +210,11 @@ fn without(mut trace: Vec<f64>, basis: &[Vec<f64>]) -> Vec<f64> {
 
 /// A value of the middling kind: of a range with both signs its upper half's.
 fn middle(low: f64, high: f64) -> f64 {
-    if low > 0.0 { (low * high).sqrt() } else { 0.5 * high }
+    match (low > 0.0, high > 0.0) {
+        (true, _) => (low * high).sqrt(),
+        (false, true) => 0.5 * high,
+        (false, false) => 0.5 * low,
+    }
 }
 
 /// A moving mean over a tenth of a second.
