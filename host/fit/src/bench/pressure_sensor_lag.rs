@@ -27,7 +27,7 @@ impl Effect for PressureSensorLag {
         source: "first-order sensor; time constants of 1 to 50 ms are usual",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps).changed(
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps).made_from_base().changed(
         Changed::new(Class::PressureSensorLag, Owner::Sensor, "P reads late by a first-order lag τ")
             .sized("time_constant", "s"),
     );
