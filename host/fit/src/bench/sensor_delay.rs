@@ -111,7 +111,7 @@ fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> 
     Some(Turn { since, before: going(came), after: going(context.direction) })
 }
 
-/// Lets `dt` seconds pass in the filter and in the course of the force, which ran straight to `force`.
+/// Lets `dt` seconds pass in the filter and for the knots of the force, which ran straight to `force`.
 fn catch_up<T: Scalar>(memory: &mut Memory<T>, time: T, dt: T, force: T) {
     Filter::step(memory, dt, &[time], &[force]);
     let n = count(memory);

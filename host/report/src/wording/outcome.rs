@@ -47,7 +47,7 @@ pub fn verdict(d: &Diagnosis) -> String {
     }
 }
 
-/// The share that is explained, in percent, where the verdict is "explained" for another reason: what is left is small.
+/// The share that is explained, in percent, where the verdict is "explained" because the residual is small.
 pub(super) fn small_rest(d: &Diagnosis) -> Option<f64> {
     (d.unexplained.share > SMALL_REST).then_some(100.0 * (1.0 - d.unexplained.share))
 }
