@@ -210,7 +210,7 @@ impl BenchChecks {
             m.share_explained *= 1.0 - share;
         }
         diagnosis.unexplained.share *= 1.0 - share;
-        let present: Vec<&Fault> = self.faults.iter().filter(|f| f.finding == Finding::Present).collect();
+        let present: Vec<&Fault> = self.with(Finding::Present).collect();
         let all: f64 = present.iter().map(|f| f.peak * f.peak).sum();
         let entries = present.iter().map(|f| Missing {
             given: given.contains(&f.law()),

@@ -77,8 +77,8 @@ impl Effect for SensorDelay {
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &Memory<T>) -> T {
         let rate = context.slope() * context.speed + context.pull_per_pressure() * context.pressure_rate;
-        let filtered = Filter::value(memory, 0, context.force());
         let now = context.force();
+        let filtered = Filter::value(memory, 0, now);
         let delayed = now - before(memory, parameters[3]).unwrap_or(now);
         -(parameters[0] * rate + parameters[1] * filtered + parameters[2] * delayed)
     }
@@ -114,17 +114,17 @@ fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> 
 /// Lets `dt` seconds pass in the filter and for the knots of the force, which ran straight to `force`.
 fn catch_up<T: Scalar>(memory: &mut Memory<T>, time: T, dt: T, force: T) {
     Filter::step(memory, dt, &[time], &[force]);
-    let n = count(memory);
+    let mut n = count(memory);
     for k in 0..n {
         memory[age(k)] += dt;
     }
     // Knots older than the first one that is as old as the dead time have no use.
-    while count(memory) > 1 && memory[age(count(memory) - 2)] >= time {
-        memory[COUNT] -= T::ONE;
+    while n > 1 && memory[age(n - 2)] >= time {
+        n -= 1;
     }
+    memory[COUNT] = T::from_f64(n as f64);
     // The newest knot moves along with the force, except from a jump, and until it is far from the one before it.
-    let follows =
-        count(memory) > 1 && memory[age(1)] > memory[age(0)] && memory[age(1)] <= time * T::from_f64(APART);
+    let follows = n > 1 && memory[age(1)] > memory[age(0)] && memory[age(1)] <= time * T::from_f64(APART);
     if follows {
         (memory[age(0)], memory[age(0) + 1]) = (T::ZERO, force);
     } else {
