@@ -211,6 +211,11 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    /// The largest size in its range, without the sign.
+    #[must_use]
+    pub const fn largest(&self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
     /// A parameter that the force is proportional to.
     pub const fn amplitude(
         letter: &'static str,

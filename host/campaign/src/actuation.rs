@@ -1,9 +1,9 @@
 //! What carries out a course: a controller over its link, or the virtual bench.
 
 use pam_data::error::Result;
+use pam_fit::checks;
 
 use crate::course::Course;
-use pam_fit::checks;
 
 /// One reading, SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,6 +1,7 @@
 //! The virtual bench as a rig: whole campaigns in a second, for trials and plans.
 
 use pam_data::error::{DataCode, Error, Result};
+use pam_fit::checks::Kind;
 use pam_protocol::{Place, Protocol, Step as BenchStep};
 use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::checks;
@@ -8,7 +9,6 @@ use virtual_bench::checks;
 use crate::actuation::{Actuation, Ending, Reading};
 use crate::course::{Course, Segment};
 use crate::criteria::SAMPLE_HZ;
-use pam_fit::checks::Kind;
 
 /// A muscle on the virtual bench.
 #[derive(Debug)]

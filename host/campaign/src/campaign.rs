@@ -8,6 +8,7 @@ use std::path::Path;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Reader, Recording};
+use pam_fit::checks;
 
 use self::resume::resume;
 use self::sink::{InMemory, OnDisk, Sink};
@@ -19,7 +20,6 @@ use crate::engine::{Decision, Engine};
 use crate::journal::{Chosen, Completion, Event, Journal, unix_seconds};
 use crate::step::Step;
 use crate::watch::{Limits, Spoiled, Watch};
-use pam_fit::checks;
 
 /// One step of the course, as it went.
 #[derive(Debug, Clone, PartialEq)]

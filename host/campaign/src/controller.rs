@@ -7,12 +7,12 @@ use pam_data::error::Result;
 use pam_device::Client;
 use pam_device::run::{Plan, run_asking};
 use pam_device::setpoint_profile::{Quantity, SetpointProfile};
+use pam_fit::checks;
 
 use crate::actuation::{Actuation, Ending, Reading};
 use crate::course::{Course, Segment, duration};
 use crate::criteria::SAMPLE_HZ;
 use crate::stroke_axis::StrokeAxis;
-use pam_fit::checks;
 
 /// Telemetry in a second of device time: twice the recording's rate, so that a stroke ends soon after the muscle is free.
 const TELEMETRY_HZ: f64 = 2.0 * SAMPLE_HZ;

@@ -10,6 +10,7 @@ use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
 use pam_diagnose::Diagnosis;
+use pam_fit::checks;
 
 pub use self::plan::{Plan, Planned};
 pub use self::ranking::{Ranking, Weighed};
@@ -24,7 +25,6 @@ use crate::rig::Rig;
 use crate::step::Step;
 use crate::watch::Spoiled;
 use crate::wording;
-use pam_fit::checks;
 
 /// What to do next.
 #[derive(Debug, Clone, PartialEq)]

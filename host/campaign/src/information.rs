@@ -16,6 +16,7 @@ use nalgebra::DMatrix;
 use pam_data::recording::{Campaign, Recording};
 use pam_diagnose::protocol_simulation::moments;
 use pam_fit::bench::{Candidate, Span};
+use pam_fit::checks;
 
 use self::seen::{Seen, View};
 use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
@@ -25,7 +26,6 @@ use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
 use crate::step::Step;
-use pam_fit::checks;
 
 /// Time between two steps that a design assumes, s.
 const PAUSE_S: f64 = 10.0;

@@ -1,12 +1,12 @@
 //! A step for people: as a protocol file that a bench runs, and as numbered instructions.
 
+use pam_fit::checks;
 use pam_protocol::{Place, Protocol, Step as ProtocolStep};
 
 use crate::course::{Course, Segment};
 use crate::criteria::SAMPLE_HZ;
 use crate::places::Places;
 use crate::step::Step;
-use pam_fit::checks;
 
 /// Speed at which the free end returns to rest length while nothing is recorded, mm/s.
 const RETURN_MM_S: f64 = 2.0;

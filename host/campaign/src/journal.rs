@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use pam_data::error::{DataCode, Error, Result};
+use pam_fit::checks;
 
 pub use self::event::{Chosen, Event};
 use crate::actuation::Reading;
-use pam_fit::checks;
 
 mod event;
 

@@ -1,10 +1,11 @@
 //! Which steps a rig can do, and the first ones of every campaign.
 
+use pam_fit::checks;
+
 use crate::criteria::{FIRST_TARE, SURVEY_SPEED};
 use crate::places::Places;
 use crate::rig::{Axis, Rig};
 use crate::step::Step;
-use pam_fit::checks;
 
 /// Every step that the rig can do, in a fixed order.
 #[must_use]

@@ -62,8 +62,7 @@ impl CandidateFit {
     /// memory a rate, a breakaway plain friction), and no lag beyond its known range. Other sizes depend on muscle and bench.
     pub(super) fn is_within_known_range(&self, candidate: &Candidate) -> bool {
         let amplitudes = candidate.info.parameters.iter().zip(&self.amplitudes);
-        let seen =
-            amplitudes.filter(|(p, _)| p.bounded).all(|(p, a)| a.abs() <= p.low.abs().max(p.high.abs()));
+        let seen = amplitudes.filter(|(p, _)| p.bounded).all(|(p, a)| a.abs() <= p.largest());
         seen && candidate.shapes().zip(&self.shapes).all(|(p, s)| unplace(&p, *s) > LOW_END)
     }
 }

@@ -152,7 +152,7 @@ impl<'a> Scorer<'a> {
         let w = likelihood(&self.scale, &self.target, &products, &signs, most);
         // Far beyond the known range another cause has this name.
         let known = candidate.info.parameters.iter();
-        let within = |(p, a): (&Parameter, &f64)| a.abs() <= AMPLITUDE_BEYOND * p.low.abs().max(p.high.abs());
+        let within = |(p, a): (&Parameter, &f64)| a.abs() <= AMPLITUDE_BEYOND * p.largest();
         let plausible =
             known.zip(&w.amplitudes).all(within) && candidate.is_consistent(&w.amplitudes, shapes);
         if plausible && w.gain > 0.0 {

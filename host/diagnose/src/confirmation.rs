@@ -80,11 +80,10 @@ fn impossible(selection: &Selection, library: &[Candidate]) -> Option<(usize, Re
     let beyond = |place: usize| {
         let fit = &selection.selected[place].fit;
         let parameters = library[fit.candidate].info.parameters.iter().zip(&fit.amplitudes).enumerate();
-        let most = |p: &Parameter| p.low.abs().max(p.high.abs());
         // A share of the whole has a limit by its meaning; a time has a usual range only.
         let limited = |p: &Parameter| p.bounded && p.unit.is_empty();
-        let mut beyond = parameters.filter(|(_, (p, a))| limited(p) && a.abs() > most(p));
-        beyond.next().map(|(k, (p, a))| (k, p.name, *a, most(p)))
+        let mut beyond = parameters.filter(|(_, (p, a))| limited(p) && a.abs() > p.largest());
+        beyond.next().map(|(k, (p, a))| (k, p.name, *a, p.largest()))
     };
     let suspects: Vec<usize> = (0..selection.selected.len()).filter(|i| beyond(*i).is_some()).collect();
     if suspects.is_empty() {

@@ -6,7 +6,7 @@
 use model_core::effects::{Info, Link, Parameter};
 use serde::Serialize;
 
-use crate::criteria::judgement::RELEVANT_SIZE;
+use crate::criteria::judgement::{EXPLAINED, RELEVANT_SIZE};
 pub use crate::experiment::Proposal;
 pub use crate::outcome::{Outcome, Pattern, Split, Verdict};
 pub use crate::remark::Remark;
@@ -66,7 +66,7 @@ impl ParameterValue {
     pub fn is_outside(value: f64, parameter: &Parameter) -> bool {
         let (low, high) = (parameter.low, parameter.high);
         let too_small = value.abs() < low.abs().min(high.abs()) && low * high > 0.0;
-        value != 0.0 && (value.abs() > high.abs().max(low.abs()) || too_small)
+        value != 0.0 && (value.abs() > parameter.largest() || too_small)
     }
 }
 
@@ -291,6 +291,13 @@ impl Diagnosis {
     /// The effects that these recordings could hide at a size that matters, and that no check of the bench has excluded.
     pub fn could_hide(&self) -> impl Iterator<Item = &Considered> {
         self.considered.iter().filter(|c| !c.checked && c.could_be_hidden(self.blocked_force_N))
+    }
+
+    /// The share of the excess error that is explained, where it is less than the verdict "explained" asks: then the rest is small.
+    #[must_use]
+    pub fn explained_beside_small_rest(&self) -> Option<f64> {
+        let explained = 1.0 - self.unexplained.share;
+        (explained < EXPLAINED).then_some(explained)
     }
 
     /// Whether there was anything to judge.

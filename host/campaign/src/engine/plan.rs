@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Recording;
+use pam_fit::checks;
 
 use super::{CLOSING, Engine};
 use crate::analysis::fitted;
@@ -15,7 +16,6 @@ use crate::purpose::Purpose;
 use crate::rig::Rig;
 use crate::step::Step;
 use crate::wording;
-use pam_fit::checks;
 
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq)]

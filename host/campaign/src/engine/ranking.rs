@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use pam_data::recording::Recording;
 use pam_diagnose::experiment::BenchCheck;
 use pam_fit::bench::Candidate;
+use pam_fit::checks;
 use rayon::prelude::*;
 
 use super::Engine;
@@ -15,7 +16,6 @@ use crate::menu::menu;
 use crate::purpose::Purpose;
 use crate::step::Step;
 use crate::wording;
-use pam_fit::checks;
 
 /// A step and what it is expected to tell.
 #[derive(Debug, Clone, Copy, PartialEq)]

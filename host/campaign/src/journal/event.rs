@@ -1,10 +1,10 @@
 //! The events of a campaign, as the lines of its log hold them.
 
+use pam_fit::checks;
 use serde::{Deserialize, Serialize};
 
 use crate::step::Step;
 use crate::watch::Spoiled;
-use pam_fit::checks;
 
 /// Why a step was chosen and what was expected of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

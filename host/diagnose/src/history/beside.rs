@@ -3,6 +3,7 @@
 //! Each is a shift of pressure per unit of its amplitude. Unseen runs decide: they must be predicted better than with the friction of the
 //! base model, and the jackknife over runs must know the amplitude. Unit of all tests: run.
 
+use model_core::effects::Parameter;
 use pam_fit::bench::Candidate;
 use pam_fit::numerics::student::{chance_beyond, half_width_95};
 
@@ -111,7 +112,7 @@ fn best_possible(of: &[Tried], columns: &[Column]) -> Option<usize> {
         let (value, column) = (of[*j].amplitude().0, &columns[*j]);
         // Settled points show a late force as a positive skew: no friction imitates it there.
         let parameter = column.effect.info().parameters.get(column.amplitude);
-        let most = parameter.map_or(0.0, |p| p.low.abs().max(p.high.abs()));
+        let most = parameter.map_or(0.0, Parameter::largest);
         value > 0.0 && value <= AMPLITUDE_BEYOND * most
     };
     (0..of.len()).filter(possible).min_by(|a, b| of[*a].sum().total_cmp(&of[*b].sum()))

@@ -28,11 +28,12 @@ pub fn verdict(d: &Diagnosis) -> String {
         Verdict::Explained if d.missing.iter().any(|m| !m.supported) => {
             "With the effects that were given, no error exceeds the noise. The recordings do not support all of them.".to_owned()
         }
-        Verdict::Explained => match small_rest(d) {
+        Verdict::Explained => match d.explained_beside_small_rest() {
             None => format!("The model lacks {}. This explains its error above the noise.", list(&names)),
-            Some(rest) => format!(
-                "The model lacks {}. This explains {rest:.0} % of its error above the noise; the rest is within the model's stated inexactness.",
-                list(&names)
+            Some(share) => format!(
+                "The model lacks {}. This explains {:.0} % of its error above the noise; the rest is within the model's stated inexactness.",
+                list(&names),
+                100.0 * share
             ),
         },
         Verdict::PartlyExplained => {
@@ -46,14 +47,6 @@ pub fn verdict(d: &Diagnosis) -> String {
         }
     }
 }
-
-/// The share that is explained, in percent, where the verdict is "explained" because the residual is small.
-pub(super) fn small_rest(d: &Diagnosis) -> Option<f64> {
-    (d.unexplained.share > SMALL_REST).then_some(100.0 * (1.0 - d.unexplained.share))
-}
-
-/// From this unexplained share of the excess error on, a text says how much is explained: the verdict alone promises four fifths.
-const SMALL_REST: f64 = 0.2;
 
 /// An error that does not repeat is noise, whatever its size: no law of the muscle makes it.
 fn noise(pattern: &Pattern) -> String {

@@ -6,7 +6,6 @@ use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict};
 use pam_diagnose::why::Why;
 
-use super::outcome::small_rest;
 use super::{
     HALF_95, HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split,
     why, with_interval,
@@ -99,11 +98,12 @@ fn header(s: &mut String, d: &Diagnosis) {
     } else {
         writeln!(s, "{}: {} rows", d.muscle, d.samples)
     };
-    let explained = match small_rest(d) {
+    let explained = match d.explained_beside_small_rest() {
         None => "EXPLAINED: the effects below explain the model's error above the noise.".to_owned(),
         Some(share) => format!(
-            "EXPLAINED: the effects below explain {share:.0} % of the model's error above the noise; the rest is within the model's \
-             stated inexactness."
+            "EXPLAINED: the effects below explain {:.0} % of the model's error above the noise; the rest is within the model's \
+             stated inexactness.",
+            100.0 * share
         ),
     };
     let _ = writeln!(
