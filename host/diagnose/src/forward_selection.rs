@@ -1,5 +1,7 @@
 //! Forward selection with exchange: the next effect, whether its evidence is sufficient, and the joint refit.
 
+mod pairs;
+
 use std::ops::ControlFlow;
 
 use model_core::effects::{Link, Start};
@@ -42,7 +44,20 @@ pub(crate) fn forward_selection(
     search.end()
 }
 
+/// An effect that is about to be selected.
+struct Winner {
+    fit: CandidateFit,
+    p: f64,
+    /// What it takes of the weighted residual, N², less what is counted for another that is selected with it.
+    gain: f64,
+    /// Its competitors: candidate, weight against it (1), cosine with it.
+    competitors: Vec<(usize, f64, f64)>,
+    /// The base without effects, in the metric of its prior.
+    metric: Baseline,
+}
+
 /// A forward selection under way.
+#[derive(Clone)]
 struct ForwardSelection<'a> {
     /// The rows, linearised about the present baseline.
     rows: Rows,
@@ -128,50 +143,68 @@ impl<'a> ForwardSelection<'a> {
         if self.first_scan.is_none() {
             self.first_scan = Some((best.clone(), p.clone()));
         }
-        let Some(at) = self.winner(&best, &p, &scorer) else { return ControlFlow::Break(()) };
+        let Some(at) = self.strongest(&best, &p, &scorer) else { return ControlFlow::Break(()) };
         if self.chosen.is_empty() {
             self.energy_before = best[at].before;
             self.excess_energy = self.excess_of(self.energy_before);
         }
         if !self.is_sufficient(&best[at], p[at]) {
-            return ControlFlow::Break(());
+            let pair = self.pair(&best, &p, &scorer);
+            return pair.map_or(ControlFlow::Break(()), |pair| self.select_pair(pair));
         }
         let winner = self.best_within_known_range(&best[at], &best, &scorer);
         if let Some(memory) = self.memory_of_unknown_start(&winner) {
-            self.remarks.push(Remark::Refused {
-                effect: self.library[winner.candidate].name().to_owned(),
-                why: Refusal::UnknownMemory(memory.to_owned()),
-            });
+            self.refuse(winner.candidate, Refusal::UnknownMemory(memory.to_owned()));
             self.excluded.push(winner.candidate);
             return ControlFlow::Continue(());
         }
-        let beside = Kind::Soft(winner.prior);
-        let metric = baselines::fit(&self.rows, beside, &[]);
-        let competitors = if self.library[winner.candidate].shown_by_check {
+        let winner = self.with_competitors(winner, p[at], &best, &scorer);
+        if let Some(why) = self.too_many_competitors(&winner) {
+            self.refuse(winner.fit.candidate, why);
+            return ControlFlow::Break(());
+        }
+        self.take(vec![winner]);
+        ControlFlow::Continue(())
+    }
+
+    /// A fit with the others that may be the cause in its place.
+    fn with_competitors(
+        &self,
+        fit: CandidateFit,
+        p: f64,
+        best: &[CandidateFit],
+        scorer: &Scorer<'_>,
+    ) -> Winner {
+        let metric = baselines::fit(&self.rows, Kind::Soft(fit.prior), &[]);
+        let competitors = if self.library[fit.candidate].shown_by_check {
             Vec::new()
         } else {
-            competitors(&winner, &best, self.library, &self.rows, &scorer, &metric.span)
+            competitors(&fit, best, self.library, &self.rows, scorer, &metric.span)
         };
-        let open: Vec<String> = competitors
+        Winner { gain: fit.gain, fit, p, competitors, metric }
+    }
+
+    /// Why an effect cannot be told from the others.
+    fn too_many_competitors(&self, winner: &Winner) -> Option<Refusal> {
+        let open: Vec<String> = winner
+            .competitors
             .iter()
             .filter(|r| r.1 > CONFUSABLE)
             .map(|r| self.library[r.0].name().to_owned())
             .collect();
-        if open.len() > MOST_COMPETITORS || model_weight(&competitors) < CONFUSABLE {
-            self.remarks.push(Remark::Refused {
-                effect: self.library[winner.candidate].name().to_owned(),
-                why: Refusal::Competitors { share: self.of_rest(&winner).min(1.0), others: open },
-            });
-            return ControlFlow::Break(());
-        }
-        self.take(winner, p[at], competitors, metric);
-        ControlFlow::Continue(())
+        (open.len() > MOST_COMPETITORS || model_weight(&winner.competitors) < CONFUSABLE)
+            .then(|| Refusal::Competitors { share: self.of_rest(&winner.fit).min(1.0), others: open })
+    }
+
+    fn refuse(&mut self, candidate: usize, why: Refusal) {
+        self.remarks.push(Remark::Refused { effect: self.library[candidate].name().to_owned(), why });
     }
 
     /// Whether a candidate may be judged at all.
     fn is_eligible(&self, t: &CandidateFit, scorer: &Scorer<'_>) -> bool {
+        // What explains the same as a selected effect is named beside it, not selected.
         let competitor =
-            |k: &SelectedEffect| k.competitors.iter().any(|r| r.0 == t.candidate && r.1 > CONFUSABLE);
+            |k: &SelectedEffect| k.competitors.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
         t.gain > 0.0
             && !self.chosen.iter().any(|c| c.candidate == t.candidate)
             && !self.excluded.contains(&t.candidate)
@@ -180,7 +213,7 @@ impl<'a> ForwardSelection<'a> {
     }
 
     /// Which of the best of each candidate is to be judged.
-    fn winner(&self, best: &[CandidateFit], p: &[f64], scorer: &Scorer<'_>) -> Option<usize> {
+    fn strongest(&self, best: &[CandidateFit], p: &[f64], scorer: &Scorer<'_>) -> Option<usize> {
         let open = || best.iter().enumerate().filter(|(_, t)| self.is_eligible(t, scorer));
         // What a check of the bench shows is there, whether or not something else explains more.
         let shown = |t: &CandidateFit| self.library[t.candidate].shown_by_check;
@@ -239,15 +272,20 @@ impl<'a> ForwardSelection<'a> {
 
     /// Whether it is beyond chance, explains enough, and is large enough to matter.
     fn is_sufficient(&self, winner: &CandidateFit, p: f64) -> bool {
+        let of_rest = self.of_rest(winner);
+        let least = if self.library[winner.candidate].shown_by_check { FURTHER_SHARE } else { LEAST_SHARE };
+        let of_all = winner.gain / self.excess_energy;
+        let worth = of_rest >= least && (self.chosen.is_empty() || of_all >= FURTHER_SHARE);
+        worth && self.is_evident(winner, p)
+    }
+
+    /// Whether it is beyond chance and large enough to matter, however much else there is.
+    fn is_evident(&self, winner: &CandidateFit, p: f64) -> bool {
         // What lives in a few strokes can never give a large sum over blocks in units of its scatter: six strokes that all agree
         // happen by chance once in 64. There the likelihood counts, whose independent rows are those that the residual's own
         // correlation leaves.
         let by_blocks = p <= FAMILY_ALPHA;
         let significant = winner.score >= if by_blocks { LEAST_SCORE } else { LEAST_SCORE_ALONE };
-        let of_rest = self.of_rest(winner);
-        let least = if self.library[winner.candidate].shown_by_check { FURTHER_SHARE } else { LEAST_SHARE };
-        let of_all = winner.gain / self.excess_energy;
-        let worth = of_rest >= least && (self.chosen.is_empty() || of_all >= FURTHER_SHARE);
         // A wall at the end of the stroke is high and narrow.
         let narrow =
             winner.peak >= NARROW_PEAK * self.blocked && winner.score >= NARROW_SCORE * LEAST_SCORE_ALONE;
@@ -260,42 +298,49 @@ impl<'a> ForwardSelection<'a> {
             (true, false) => 1.0,
             (false, _) => ALONE_FLOOR,
         };
-        significant && worth && moved >= least * SELECTION_FLOOR * self.blocked
+        significant && moved >= least * SELECTION_FLOOR * self.blocked
     }
 
-    /// Refits all effects jointly with it. It is selected if it keeps most of its gain; else it is excluded.
-    fn take(&mut self, winner: CandidateFit, p: f64, competitors: Vec<(usize, f64, f64)>, metric: Baseline) {
-        let name = self.library[winner.candidate].name();
-        let beside = Kind::Soft(winner.prior);
-        let chosen = self.chosen.iter().chain([&winner]).cloned().collect();
+    /// Refits all effects jointly with these. They are selected if each keeps most of its gain; else the first that does not is excluded.
+    fn take(&mut self, winners: Vec<Winner>) {
+        let Some(last) = winners.last() else { return };
+        let beside = Kind::Soft(last.fit.prior);
+        let chosen = self.chosen.iter().chain(winners.iter().map(|w| &w.fit)).cloned().collect();
         let joint = refit(&self.rows, beside, chosen, self.library);
         // The new residual determines how many rows are independent: a drifting zero that flexible tables had followed from
         // pressure to pressure shows itself only now.
         let left = noise::estimate(&joint.rows, &joint.base.residual, self.step);
-        let refusal = self.refusal(&winner, &metric, &joint, left.memory);
-        if let Some(why) = refusal {
-            // The effects before it stay as they were fitted without it.
-            self.excluded.push(winner.candidate);
-            self.remarks.push(Remark::Refused { effect: name.to_owned(), why });
-            return;
+        for winner in &winners {
+            if let Some(why) = self.refusal(&winner.fit, &winner.metric, &joint, left.memory) {
+                // The effects before it stay as they were fitted without it.
+                self.excluded.push(winner.fit.candidate);
+                self.refuse(winner.fit.candidate, why);
+                return;
+            }
         }
         self.kind = beside;
-        self.base_alone = metric;
         self.joined(joint);
         // What changed from cycle to cycle was not noise where the effect explains it.
         let sigma = if left.from_repeats { left.sigma.min(self.noise.sigma) } else { self.noise.sigma };
         self.noise = Noise { sigma, from_repeats: self.noise.from_repeats, ..left };
         self.scale.sigma = sigma.max(LEAST_SIGMA * self.blocked);
         self.excess_energy = self.excess_of(self.energy_before);
-        let share = winner.gain / self.excess_energy;
-        let about = self.chosen.last().and_then(|c| c.about.clone());
-        self.selected.push(SelectedEffect {
-            fit: CandidateFit { about, ..winner },
-            p,
-            share,
-            competitors,
-            rms: self.joint.rms(&self.rows),
-        });
+        let first = self.chosen.len() - winners.len();
+        for (at, Winner { fit, p, gain, competitors, metric }) in winners.into_iter().enumerate() {
+            let about = self.chosen[first + at].about.clone();
+            self.base_alone = metric;
+            // What is selected is not in its place.
+            for t in &mut self.selected {
+                t.competitors.retain(|r| r.0 != fit.candidate);
+            }
+            self.selected.push(SelectedEffect {
+                fit: CandidateFit { about, ..fit },
+                p,
+                share: gain / self.excess_energy,
+                competitors,
+                rms: self.joint.rms(&self.rows),
+            });
+        }
         if self.chosen.len() > 1 {
             self.exchange();
         }
@@ -435,9 +480,9 @@ mod tests {
         let others = best.iter().filter(|t| t.candidate != search.chosen[0].candidate);
         let most = others.max_by(|a, b| a.gain.total_cmp(&b.gain)).expect("another candidate");
         let weak = CandidateFit { score: 0.0, ..most.clone() };
-        let metric = baselines::fit(&search.rows, Kind::Soft(weak.prior), &[]);
         let refused = weak.candidate;
-        search.take(weak, 1.0, Vec::new(), metric);
+        let weak = search.with_competitors(weak, 1.0, &[], &scorer);
+        search.take(vec![weak]);
         assert!(search.excluded.contains(&refused));
         assert_eq!(fitted(&search), before);
     }

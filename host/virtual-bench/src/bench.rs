@@ -241,7 +241,8 @@ impl Bench {
         let blend = 1.0 - (-dt / CROSSHEAD).exp();
         self.rounded += (self.aim - self.rounded) * blend;
         self.crosshead += (self.rounded - self.crosshead) * blend;
-        let stroke = self.rig.stroke(self.crosshead, self.force);
+        let (muscle, before, ambient) = (&self.muscle, self.air.in_muscle(), self.ambient);
+        let stroke = self.rig.stroke(self.crosshead, |x| muscle.force_after(dt, x, before, ambient));
         let pressure = self.air.advance(dt, self.command, self.muscle.volume(stroke));
         let drive = self.muscle.advance(dt, stroke, pressure, self.ambient);
         self.force = drive.force;

@@ -6,6 +6,7 @@ use crate::physics::{Moment, Physics, PhysicsState};
 use crate::surface::{Shape, Surface};
 use crate::tube::{Geometry, Tube};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Which way the muscle works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -178,11 +179,11 @@ pub struct TruthAt {
 /// Push at which a slack muscle buckles, part of the blocked force at the rated pressure.
 pub const BUCKLING: f64 = 0.001;
 
-/// A muscle at work: tables built once, and its state.
+/// A muscle at work: tables built once, and its state. Clones share the tables.
 #[derive(Debug, Clone)]
 pub struct Muscle {
-    spec: MuscleSpec,
-    surface: Surface,
+    spec: Arc<MuscleSpec>,
+    surface: Arc<Surface>,
     tube_volume: f64,
     braid: Braid,
     buckling: f64,
@@ -209,8 +210,15 @@ impl Muscle {
         let surface = Surface::new(spec.geometry, tube, spec.shape, spec.max_pressure, shortest);
         let braid = Braid::new(&spec.friction);
         let physics = PhysicsState::new(&spec.physics);
-        let mut muscle =
-            Self { tube_volume: tube.volume(), surface, braid, buckling: 0.0, physics, spec, last: None };
+        let mut muscle = Self {
+            tube_volume: tube.volume(),
+            surface: Arc::new(surface),
+            braid,
+            buckling: 0.0,
+            physics,
+            spec: Arc::new(spec),
+            last: None,
+        };
         muscle.buckling = BUCKLING * muscle.straight_parts(muscle.spec.max_pressure, 0.0).0.max(0.0);
         muscle
     }
@@ -309,6 +317,11 @@ impl Muscle {
             young_mpa: self.spec.material.young() * 1e-6,
             pressures: pressures.iter().map(at).collect(),
         }
+    }
+
+    /// The force (N) after a step of `dt` (s) to a contraction stroke (m) and pressure (Pa) that is not made.
+    pub fn force_after(&self, dt: f64, stroke: f64, p: f64, ambient: f64) -> f64 {
+        self.clone().advance(dt, stroke, p, ambient).force
     }
 
     /// Advance by `dt` (s) to a contraction stroke (m) and pressure (Pa) and give the force there.

@@ -37,6 +37,8 @@ pub struct Readings {
     pub temperature: f64,
 }
 
+/// Temperature of the room, °C.
+const AMBIENT: f64 = 22.0;
 /// Longest step of the physics, s.
 const LONGEST: f64 = 0.25e-3;
 /// The same with valves, by which the length of a pulse is resolved.
@@ -94,7 +96,7 @@ impl Plant {
             stroke,
             speed: 0.0,
             force: 0.0,
-            temperature: 22.0,
+            temperature: AMBIENT,
             readings: Readings::default(),
             done,
             valves: None,
@@ -152,14 +154,15 @@ impl Plant {
         } else {
             (self.stroke, self.done) = self.motion.stroke(self.time);
         }
-        let stroke = self.rig.stroke(self.stroke, self.force);
+        let (muscle, before) = (&self.muscle, self.air.in_muscle());
+        let stroke = self.rig.stroke(self.stroke, |x| muscle.force_after(h, x, before, AMBIENT));
         let volume = self.muscle.volume(stroke);
         let pressure = match (supply, &mut self.valves) {
             (Supply::Valves(signals), Some(valves)) => self.air.advance_valves(h, valves, signals, volume),
             (Supply::Valves(_), None) => self.air.advance(h, 0.0, volume),
             (Supply::Regulator(command), _) => self.air.advance(h, command.max(0.0), volume),
         };
-        let drive = self.muscle.advance(h, stroke, pressure, 22.0);
+        let drive = self.muscle.advance(h, stroke, pressure, AMBIENT);
         self.force = drive.force;
         self.temperature = drive.temperature;
         self.channels[0].follow(h, self.air.seen());

@@ -34,6 +34,8 @@ pam_data::criteria! {
     LEAST_SHARE: f64 = 0.4, "q_first", "1", Judgement;
     /// A further effect must also explain this share of all excess error: more than the first law leaves by its inexactness.
     FURTHER_SHARE: f64 = 0.03, "q_further", "1", Derived("17 % of the error; laws are off by 3 to 7 % of their traces");
+    /// Effects with which pairs are tried where no effect explains enough alone.
+    FIRSTS_OF_PAIRS: usize = 3, "n_pair", "1", Cost;
     /// Effects that are selected at most.
     MOST_SELECTED: usize = 5, "n_max", "1", Judgement;
     /// An effect is not selected where one that is concealed scores this many times as much.
