@@ -158,11 +158,7 @@ pub(crate) fn refit(rows: &Rows, kind: Kind, fits: Vec<CandidateFit>, library: &
     let renewed = baselines::linearised(rows, &first.base);
     let fits = first.fits.iter().map(|f| CandidateFit { about: None, ..f.clone() }).collect();
     let second = fitted_beside(&renewed, kind, fits, library);
-    if energy(&second.base.residual) <= WORSE * energy(&first.base.residual) {
-        let rows = baselines::linearised(&second.rows, &second.base);
-        return JointFit { rows, ..second };
-    }
-    first
+    if energy(&second.base.residual) <= WORSE * energy(&first.base.residual) { second } else { first }
 }
 
 /// The baseline with effects beside it as they see the model now.

@@ -6,6 +6,7 @@ pub(crate) mod added;
 mod held_length;
 mod plays;
 mod ramps;
+mod together;
 
 use model_core::braid::Geometry;
 use model_core::muscle::Muscle;

@@ -56,14 +56,7 @@ const GUIDE_TRAVEL: f64 = 20e-6;
 impl RigState {
     /// Unloaded.
     pub fn new(with: Rig) -> Self {
-        Self {
-            with,
-            played: None,
-            last: None,
-            guide: 0.0,
-            stuck: 0.0,
-            clock: 0.0,
-        }
+        Self { with, played: None, last: None, guide: 0.0, stuck: 0.0, clock: 0.0 }
     }
 
     /// Stroke of the muscle (m) when the crosshead is at `crosshead` (m). `force` tells what the muscle would pull with at a stroke, N.

@@ -8,7 +8,8 @@ use std::ops::ControlFlow;
 use super::super::baselines::Kind;
 use super::super::candidate_fit::CandidateFit;
 use super::super::candidate_scoring::Scorer;
-use super::super::criteria::selection::{FIRSTS_OF_PAIRS, MOST_SELECTED};
+use super::super::criteria::selection::{FIRSTS_OF_PAIRS, FURTHER_SHARE, MOST_SELECTED};
+use super::super::linear::energy;
 use super::super::selection_step::{refit, scan_step};
 use super::{ForwardSelection, Winner};
 
@@ -21,7 +22,9 @@ pub(super) struct Pair {
 impl ForwardSelection<'_> {
     /// The two effects that leave least, out of those of which each is sufficient beside the other.
     pub(super) fn pair(&self, best: &[CandidateFit], p: &[f64], scorer: &Scorer<'_>) -> Option<Pair> {
-        if self.chosen.len() + 2 > MOST_SELECTED {
+        let rest = self.excess_of(energy(&self.joint.residual));
+        let too_little = !self.chosen.is_empty() && rest < FURTHER_SHARE * self.excess_energy;
+        if too_little || self.chosen.len() + 2 > MOST_SELECTED {
             return None;
         }
         let evident = |(at, t): &(usize, &CandidateFit)| {
@@ -54,32 +57,40 @@ impl ForwardSelection<'_> {
 
     /// An effect with its best partner, where each is sufficient beside the other.
     fn pair_with(&self, first: &CandidateFit) -> Option<Pair> {
-        let (second, _) = self.sufficient_beside(first, |_| true)?;
-        let (first_beside, left) = self.sufficient_beside(&second.fit, |t| t.candidate == first.candidate)?;
+        let (second, _) = self.beside(first).strongest_sufficient(|_| true)?;
+        let beside = self.beside(&second.fit);
+        // Before all others are weighed there, which takes time.
+        let alone = Scorer::new(&beside.joint, self.scale).refine(first, self.library, &beside.rows);
+        if !beside.is_sufficient(&alone, 0.0) {
+            return None;
+        }
+        let (first_beside, left) = beside.strongest_sufficient(|t| t.candidate == first.candidate)?;
         // What the pair explains is what the first does alone and the second beside it.
         let first = Winner { gain: first.gain, ..first_beside };
         Some(Pair { winners: [first, second], left })
     }
 
-    /// The strongest effect that is sufficient beside another one, among those wanted; and what both leave, N².
-    fn sufficient_beside(
-        &self,
-        other: &CandidateFit,
-        wanted: impl Fn(&CandidateFit) -> bool,
-    ) -> Option<(Winner, f64)> {
+    /// The same with one effect more, whatever its evidence.
+    fn beside(&self, other: &CandidateFit) -> Self {
         let chosen = self.chosen.iter().chain([other]).cloned().collect();
         let joint = refit(&self.rows, Kind::Soft(other.prior), chosen, self.library);
         let mut beside = self.clone();
         beside.joined(joint);
-        let scorer = Scorer::new(&beside.joint, self.scale);
-        let (best, p) = scan_step(self.library, &beside.rows, &scorer, self.blocked, &beside.chosen);
-        let open = best.iter().enumerate().filter(|(_, t)| {
-            wanted(t) && beside.is_eligible(t, &scorer) && beside.is_within_range(t)
-        });
+        beside
+    }
+
+    /// The strongest of the effects that are wanted, if it is sufficient; and what it leaves, N².
+    fn strongest_sufficient(&self, wanted: impl Fn(&CandidateFit) -> bool) -> Option<(Winner, f64)> {
+        let scorer = Scorer::new(&self.joint, self.scale);
+        let (best, p) = scan_step(self.library, &self.rows, &scorer, self.blocked, &self.chosen);
+        let open = best
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| wanted(t) && self.is_eligible(t, &scorer) && self.is_within_range(t));
         let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
-        beside.is_sufficient(winner, p[at]).then(|| {
+        self.is_sufficient(winner, p[at]).then(|| {
             let left = (winner.before - winner.gain).max(0.0);
-            (beside.with_competitors(winner.clone(), p[at], &best, &scorer), left)
+            (self.with_competitors(winner.clone(), p[at], &best, &scorer), left)
         })
     }
 }
