@@ -184,7 +184,7 @@ impl<'a> ForwardSelection<'a> {
         Winner { gain: fit.gain, fit, p, competitors, metric }
     }
 
-    /// Why an effect cannot be told from the others.
+    /// Why an effect cannot be distinguished from the others.
     fn too_many_competitors(&self, winner: &Winner) -> Option<Refusal> {
         let open: Vec<String> = winner
             .competitors

@@ -59,7 +59,7 @@ impl RigState {
         Self { with, played: None, last: None, guide: 0.0, stuck: 0.0, clock: 0.0 }
     }
 
-    /// Stroke of the muscle (m) when the crosshead is at `crosshead` (m). `force` tells what the muscle would pull with at a stroke, N.
+    /// Stroke of the muscle (m) when the crosshead is at `crosshead` (m). `force` gives the pull of the muscle at a stroke, N.
     pub fn stroke(&mut self, crosshead: f64, force: impl Fn(f64) -> f64) -> f64 {
         let mut stroke = crosshead + self.with.offset;
         if self.with.stiffness > 0.0 {

@@ -79,14 +79,14 @@ impl ForwardSelection<'_> {
         beside
     }
 
-    /// The strongest of the effects that are wanted, if it is sufficient; and what it leaves, N².
-    fn strongest_sufficient(&self, wanted: impl Fn(&CandidateFit) -> bool) -> Option<(Winner, f64)> {
+    /// The strongest of the effects among which to look, if it is sufficient; and what it leaves, N².
+    fn strongest_sufficient(&self, among: impl Fn(&CandidateFit) -> bool) -> Option<(Winner, f64)> {
         let scorer = Scorer::new(&self.joint, self.scale);
         let (best, p) = scan_step(self.library, &self.rows, &scorer, self.blocked, &self.chosen);
         let open = best
             .iter()
             .enumerate()
-            .filter(|(_, t)| wanted(t) && self.is_eligible(t, &scorer) && self.is_within_range(t));
+            .filter(|(_, t)| among(t) && self.is_eligible(t, &scorer) && self.is_within_range(t));
         let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
         self.is_sufficient(winner, p[at]).then(|| {
             let left = (winner.before - winner.gain).max(0.0);
