@@ -88,7 +88,8 @@ impl ForwardSelection<'_> {
             .enumerate()
             .filter(|(_, t)| among(t) && self.is_eligible(t, &scorer) && self.is_within_range(t));
         let (at, winner) = open.max_by(|a, b| a.1.score.total_cmp(&b.1.score))?;
-        self.is_sufficient(winner, p[at]).then(|| {
+        let sufficient = self.is_sufficient(winner, p[at]) && self.memory_of_unknown_start(winner).is_none();
+        sufficient.then(|| {
             let left = (winner.before - winner.gain).max(0.0);
             (self.with_competitors(winner.clone(), p[at], &best, &scorer), left)
         })
