@@ -282,12 +282,13 @@ impl<'a> Scorer<'a> {
         work.par_iter().map(fit).collect()
     }
 
-    /// Coordinate search in the shapes from a fit, with a step that halves; with scores by blocks.
+    /// Coordinate search in the shapes from a fit, with a step that halves, at a change point down to a row; with scores by blocks.
     pub(crate) fn refine(&self, start: &CandidateFit, library: &[Candidate], rows: &Rows) -> CandidateFit {
         let candidate = &library[start.candidate];
         let mut best = start.clone();
         let mut step = (0.5 / candidate.grid().len() as f64).max(REFINEMENT_STEP);
-        for _ in 0..if best.shapes.is_empty() { 0 } else { REFINEMENT_HALVINGS } {
+        let finest = candidate.finest_step(rows).min(step * 0.5_f64.powi(REFINEMENT_HALVINGS as i32 - 1));
+        while !best.shapes.is_empty() && step >= finest {
             for _ in 0..REFINEMENT_STEPS {
                 let better = candidate
                     .neighbours(&best.shapes, step)

@@ -4,7 +4,7 @@ use model_core::effects::{Axis, Context, Imitates, Info, MEMORY, Parameter, Role
 
 use super::criteria::candidates::{CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, RANGE_OVERSHOOT, SHAPE_GRID};
 use super::linear::Sign;
-use super::rows::Rows;
+use super::rows::{Rows, typical_step};
 use pam_fit::bench::{self, Span, read_when_vented};
 
 /// The equations of a candidate.
@@ -168,6 +168,12 @@ impl Candidate {
             }
         }
         near
+    }
+
+    /// The smallest step of its shapes, as a share of their range, that the recordings distinguish: a change point stands between two rows.
+    pub(super) fn finest_step(&self, rows: &Rows) -> f64 {
+        let points = self.shapes().filter(|p| p.axis == Axis::Time);
+        points.map(|p| typical_step(rows) / (p.high - p.low)).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether parameters that were fitted freely can belong to one cause.
