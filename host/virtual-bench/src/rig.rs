@@ -77,13 +77,9 @@ impl RigState {
     /// times stiffer from one point to the next.
     fn give(&self, force: impl Fn(f64) -> f64) -> f64 {
         let too_far = |give: f64| give - force(give) / self.with.stiffness;
-        let (mut low, mut high) = (0.0, 0.0);
-        let (mut at_low, mut at_high) = (too_far(0.0), 0.0);
-        if at_low == 0.0 {
-            return 0.0;
-        }
-        high -= at_low;
-        at_high += too_far(high);
+        let at_none = too_far(0.0);
+        let (mut low, mut high) = (0.0, -at_none);
+        let (mut at_low, mut at_high) = (at_none, too_far(high));
         let mut last_side = 0;
         for _ in 0..SOLUTION_STEPS {
             let across = at_high - at_low;
