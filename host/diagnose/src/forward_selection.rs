@@ -4,7 +4,7 @@ mod pairs;
 
 use std::ops::ControlFlow;
 
-use model_core::effects::{Link, Start};
+use model_core::effects::{Experiment, Link, Start};
 
 use super::baselines::{self, Baseline, Kind, PriorDeviations};
 use super::candidate_fit::{self, CandidateFit};
@@ -152,7 +152,7 @@ impl<'a> ForwardSelection<'a> {
             let pair = self.pair(&best, &p, &scorer);
             return pair.map_or(ControlFlow::Break(()), |pair| self.select_pair(pair));
         }
-        let winner = self.best_within_known_range(&best[at], &best, &scorer);
+        let winner = self.best_supported(&best[at], &best, &scorer);
         if let Some(memory) = self.memory_of_unknown_start(&winner) {
             self.refuse(winner.candidate, Refusal::UnknownMemory(memory.to_owned()));
             self.excluded.push(winner.candidate);
@@ -227,28 +227,36 @@ impl<'a> ForwardSelection<'a> {
         (!self.chosen.is_empty() || !shadow).then_some(at)
     }
 
-    /// The winner; or, where it explains the misfit only at the edge of what is known of it, the best that explains the same within what
-    /// is known. The winner has shown that there is something to explain: its score stays.
-    fn best_within_known_range(
+    /// The winner; or, where it explains the misfit only at the edge of what is known of it, or is a law of speed and there is one speed, the
+    /// best that explains the same without this. The winner has shown that there is something to explain: its score stays.
+    ///
+    /// At one speed a drag and a constant friction are the same. A constant friction that is called a drag is predicted to grow with the
+    /// speed, to many times its size; a drag that is called a constant friction is predicted as it was recorded.
+    fn best_supported(
         &self,
         winner: &CandidateFit,
         best: &[CandidateFit],
         scorer: &Scorer<'_>,
     ) -> CandidateFit {
         let known = |t: &CandidateFit| t.is_within_known_range(&self.library[t.candidate]);
-        if known(winner) {
+        let of_speed = |t: &CandidateFit| self.library[t.candidate].traits.shown_by == Experiment::Speeds;
+        let one_speed = self.rows.have_one_speed();
+        let supported = |t: &CandidateFit| known(t) && !(one_speed && of_speed(t));
+        if supported(winner) {
             return winner.clone();
         }
         let metric = baselines::fit(&self.rows, Kind::Soft(winner.prior), &[]);
         let competitors = competitors(winner, best, self.library, &self.rows, scorer, &metric.span);
         let alike = |t: &CandidateFit| competitors.iter().any(|r| r.0 == t.candidate && r.1 >= ALIKE);
-        best.iter()
-            .filter(|t| known(t) && alike(t) && self.is_eligible(t, scorer))
-            .max_by(|a, b| a.score.total_cmp(&b.score))
-            .map_or_else(
-                || winner.clone(),
-                |t| CandidateFit { score: winner.score.max(t.score), ..t.clone() },
-            )
+        let strongest = |accepted: &dyn Fn(&CandidateFit) -> bool| {
+            let open = best.iter().filter(|t| accepted(t) && alike(t) && self.is_eligible(t, scorer));
+            open.max_by(|a, b| a.score.total_cmp(&b.score))
+        };
+        let other = strongest(&supported).or_else(|| strongest(&known).filter(|_| !known(winner)));
+        other.map_or_else(
+            || winner.clone(),
+            |t| CandidateFit { score: winner.score.max(t.score), ..t.clone() },
+        )
     }
 
     /// The effect chosen whose memory has to find itself in the very strokes by which a law of friction would be named.

@@ -18,7 +18,7 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
-use super::criteria::rows::{PRESSURE_TRIM, SPIKES_MENTIONED};
+use super::criteria::rows::{ONE_SPEED, PRESSURE_TRIM, SPEED_TRIM, SPIKES_MENTIONED};
 use super::remark::Remark;
 use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
@@ -240,6 +240,16 @@ impl Rows {
             single_bladder: self.single_bladder,
             progress: self.progress.clone(),
         }
+    }
+}
+
+impl Rows {
+    /// Whether the muscle moved at one speed throughout, so that a law of speed is a constant.
+    pub(crate) fn have_one_speed(&self) -> bool {
+        let moving =
+            self.contexts().iter().zip(self.root_weight()).filter(|(c, w)| **w > 0.0 && c.speed != 0.0);
+        let mut speeds: Vec<f64> = moving.map(|(c, _)| c.speed.abs()).collect();
+        quantile(&mut speeds, 1.0 - SPEED_TRIM) < ONE_SPEED * quantile(&mut speeds, SPEED_TRIM)
     }
 }
 

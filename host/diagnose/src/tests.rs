@@ -13,6 +13,7 @@ use model_core::muscle::Muscle;
 use model_core::table::{self, MuscleTable};
 use model_core::units::{Length, Pressure};
 
+use self::together::Wrong;
 use super::linear::Random;
 use super::outcome::Verdict;
 use super::protocol_simulation::{Place, Protocol, Step, play};
@@ -285,6 +286,18 @@ fn constant_friction_is_found_with_its_size() {
     assert!(set.contains(&"coulomb-friction"), "{set:?}");
     assert!(d.held_out.rms_after_N < 0.5 * d.held_out.rms_before_N, "{:?}", d.held_out);
     assert!((first.peak_N - 4.0).abs() < 1.0, "{} N", first.peak_N);
+}
+
+#[test]
+fn at_one_speed_friction_is_not_called_a_law_of_speed() {
+    for friction_per_pascal in [1.0e-6, 3.0e-6, 8.0e-6] {
+        let d = ask(&together::on_a_bench_with(&Wrong { friction_per_pascal, ..Wrong::default() }));
+        let first = d.missing.first().expect("something is missing");
+        eprintln!("{friction_per_pascal} {} {:?}", first.effect, first.confusable_with);
+        let of_speed = ["viscous-damping", "rate-power", "stribeck-friction", "pressure-lag"];
+        assert!(!of_speed.contains(&first.effect.as_str()), "{}", first.effect);
+        assert!(first.confusable_with.iter().any(|n| n == "viscous-damping"), "{:?}", first.confusable_with);
+    }
 }
 
 #[test]

@@ -4,6 +4,10 @@ pam_data::criteria! {
     "Rows: readings, pressure levels, blocks":
     /// Share of the readings at either end that the range of the pressure leaves out.
     PRESSURE_TRIM: f64 = 0.002, "q_trim,P", "1", Judgement;
+    /// Share of the moving rows at either end that the range of the speed leaves out: the muscle starts and stops.
+    SPEED_TRIM: f64 = 0.1, "q_trim,v", "1", Judgement;
+    /// Speeds within this factor are one speed.
+    ONE_SPEED: f64 = 2.0, "v_max/v_min", "1", Convention("speeds of a protocol differ by octaves or more");
     /// Rows aimed at: enough for every reversal, few enough for seconds of computing.
     TARGET_ROWS: usize = 24_000, "N", "1", Cost;
     /// A reading is a spike where it differs from the median of five by this many deviations of the noise.

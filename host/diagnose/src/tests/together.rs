@@ -9,18 +9,18 @@ use crate::rows::{prepare, typical_step};
 
 /// What is wrong on a bench, besides friction of 8 %.
 #[derive(Default)]
-struct Wrong {
+pub(super) struct Wrong {
     /// Length that an end loses in the middle of the third file, as a share of the largest stroke.
-    slip: f64,
+    pub slip: f64,
     /// Friction for each pascal, N.
-    friction_per_pascal: f64,
+    pub friction_per_pascal: f64,
     /// Friction besides, N.
-    friction: f64,
+    pub friction: f64,
     /// How fast the load cell's zero drifts, N/h.
-    drift_per_hour: f64,
+    pub drift_per_hour: f64,
 }
 
-fn on_a_bench_with(wrong: &Wrong) -> Campaign {
+pub(super) fn on_a_bench_with(wrong: &Wrong) -> Campaign {
     let mut campaign = loops(&[0.2]);
     let largest = campaign.recordings.iter().flat_map(|r| r.stroke.iter().copied()).fold(0.0, f64::max);
     let muscle = muscle();
