@@ -494,4 +494,22 @@ mod tests {
         assert!(search.excluded.contains(&refused));
         assert_eq!(fitted(&search), before);
     }
+
+    #[test]
+    fn a_drag_gives_way_to_a_constant_friction_that_explains_the_same_at_one_speed_only() {
+        for (speeds, drag_stays) in [(&[0.2][..], false), (&[0.05, 0.2, 0.8], true)] {
+            let campaign = recorded(loops(speeds), 4, coloured(0.1, 2.0), |v, _, _| -8.0e3 * v);
+            let braid = geometry().build().expect("a braid");
+            let (rows, _) = prepare(&campaign, &braid).expect("rows");
+            let library = library(&rows, &[]);
+            let blocked = rows.force.iter().copied().fold(0.0, f64::max);
+            let search = ForwardSelection::begin(&rows, &library, blocked, typical_step(&rows), &[]);
+            let scorer = Scorer::new(&search.joint, search.scale);
+            let (best, _) = scan_step(&library, &search.rows, &scorer, blocked, &[]);
+            let is_drag = |t: &&CandidateFit| library[t.candidate].name() == "viscous-damping";
+            let drag = best.iter().find(is_drag).expect("a fit");
+            let supported = search.best_supported(drag, &best, &scorer);
+            assert_eq!(is_drag(&&supported), drag_stays, "{}", library[supported.candidate].name());
+        }
+    }
 }

@@ -293,7 +293,6 @@ fn at_one_speed_friction_is_not_called_a_law_of_speed() {
     for friction_per_pascal in [1.0e-6, 3.0e-6, 8.0e-6] {
         let d = ask(&together::on_a_bench_with(&Wrong { friction_per_pascal, ..Wrong::default() }));
         let first = d.missing.first().expect("something is missing");
-        eprintln!("{friction_per_pascal} {} {:?}", first.effect, first.confusable_with);
         let of_speed = ["viscous-damping", "rate-power", "stribeck-friction", "pressure-lag"];
         assert!(!of_speed.contains(&first.effect.as_str()), "{}", first.effect);
         assert!(first.confusable_with.iter().any(|n| n == "viscous-damping"), "{:?}", first.confusable_with);
