@@ -43,6 +43,8 @@ struct Fault {
     peak: f64,
     /// The same at the end of the 95 % interval that is further from none, N.
     at_most: f64,
+    /// Whether it is named although the recordings do not show it: a play that is measured surely and matters where the muscle slides.
+    stands: bool,
 }
 
 impl Fault {
@@ -60,22 +62,24 @@ impl Fault {
             .map(|(at, v)| v + measured.half_width(at).copysign(*v))
             .collect();
         let largest = peak(rows.contexts(), &measured.parameters);
+        let is_play = measured.fault == BenchName::Backlash;
         // At a reversal even the least play delays the whole jump of friction; how much it may hide is counted where the muscle slides.
-        let sliding = |c: &Context<f64>| Context { friction: 0.0, ..*c };
-        let at_most = if measured.fault == BenchName::Backlash {
-            peak(&rows.contexts().iter().map(sliding).collect::<Vec<_>>(), &further)
+        let sliding: Vec<Context<f64>> = if is_play {
+            rows.contexts().iter().map(|c| Context { friction: 0.0, ..*c }).collect()
         } else {
-            peak(rows.contexts(), &further)
+            Vec::new()
         };
+        let at_most = if is_play { peak(&sliding, &further) } else { peak(rows.contexts(), &further) };
+        let stands = is_play && measured.is_sure() && material(peak(&sliding, &measured.parameters));
         let finding = if !material(largest) || !(measured.is_sure() || measured.is_likely()) {
             Finding::Absent
-        } else if measured.is_sure() && measured.fault != BenchName::Backlash {
+        } else if measured.is_sure() && !is_play {
             Finding::Present
         } else {
             // The recordings decide where chance could still be the cause, and on a play, which cannot be removed from a reading.
             Finding::Possible
         };
-        Self { measured: measured.clone(), finding, peak: largest, at_most }
+        Self { measured: measured.clone(), finding, peak: largest, at_most, stands }
     }
 
     const fn law(&self) -> Law {
@@ -191,7 +195,14 @@ impl BenchChecks {
         for f in self.with(Finding::Absent).filter(|f| !given.contains(&f.law())) {
             diagnosis.considered.push(excluded(f.measured.fault.info(), f.source(), f.at_most));
         }
-        diagnosis.remarks.extend(self.with(Finding::Possible).map(Fault::remark));
+        for f in self.with(Finding::Possible) {
+            let named = diagnosis.missing.iter().any(|m| m.effect == f.measured.fault.info().name);
+            if f.stands && diagnosis.judged() && !named {
+                name_without_evidence(&mut diagnosis, f.missing(0.0));
+            } else {
+                diagnosis.remarks.push(f.remark());
+            }
+        }
         if let Some(leak) = &self.leak {
             leak.enter(&mut diagnosis, given);
         }
@@ -258,6 +269,15 @@ fn one_bladder(
     let (rows, _) = baselines::without_slack(&rows, &fitted);
     let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
     Ok((rows, fitted))
+}
+
+/// Names an effect that a check shows and the recordings do not: it is there, and how much of the error it explains is not known.
+fn name_without_evidence(diagnosis: &mut Diagnosis, missing: Missing) {
+    diagnosis.considered.retain(|c| c.effect != missing.effect);
+    diagnosis.missing.push(missing);
+    if diagnosis.verdict() == Verdict::Consistent {
+        diagnosis.outcome = Outcome::Judged(Verdict::Explained);
+    }
 }
 
 /// An effect that a check excludes, with the largest force that it may still make, N.

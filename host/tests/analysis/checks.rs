@@ -145,6 +145,25 @@ fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     assert!(diagnosed(&sound, read(&sound)).missing.is_empty());
 }
 
+/// Where the load cell is noisy the recordings do not show a play; the bar shows it.
+#[test]
+fn a_play_that_a_rigid_bar_shows_is_named_where_it_matters() {
+    for (play, matters) in [(20e-6, true), (2e-6, false)] {
+        let mut loose = bench();
+        loose.rig.play = play;
+        loose.instruments.force.coloured = (1.0, 5.0);
+        let without = diagnosed(&loose, Checks::default());
+        assert!(without.missing.is_empty(), "{play}: {:?}", without.missing);
+        let folder = tempfile::tempdir().expect("a folder");
+        let bar: Vec<PathBuf> =
+            files(&loose, &folder).into_iter().filter(|f| f.ends_with("rigid_bar.csv")).collect();
+        let answer = diagnosed(&loose, Checks::read(&bar).expect("a check"));
+        let named: Vec<(&str, bool)> =
+            answer.missing.iter().map(|m| (m.effect.as_str(), m.checked)).collect();
+        assert_eq!(named, if matters { vec![("backlash", true)] } else { Vec::new() }, "{play}");
+    }
+}
+
 #[test]
 fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
     let size = 0.04 * 120.0;

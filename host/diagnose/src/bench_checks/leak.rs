@@ -2,8 +2,8 @@
 
 use super::super::criteria::judgement::CHECKED_PROBABILITY;
 use super::super::rows::Rows;
-use super::super::verdict::{Diagnosis, Missing, Outcome, Remark, Verdict, Why};
-use super::{Finding, excluded};
+use super::super::verdict::{Diagnosis, Missing, Remark, Why};
+use super::{Finding, excluded, name_without_evidence};
 use pam_fit::bench::Candidate as Law;
 use pam_fit::checks::Loss;
 
@@ -45,16 +45,13 @@ impl Leak {
                 diagnosis.considered.push(excluded(info, (check, value), self.at_most));
             }
             Finding::Present if diagnosis.judged() && !named => {
-                diagnosis.considered.retain(|c| c.effect != info.name);
-                diagnosis.missing.push(Missing {
+                let leak = Missing {
                     checked: true,
                     peak_N: self.at_least,
                     p: (self.loss.half_width / self.loss.rate).powi(2).min(1.0),
                     ..Missing::of(info, CHECKED_PROBABILITY, Why::Measured { check, value })
-                });
-                if diagnosis.verdict() == Verdict::Consistent {
-                    diagnosis.outcome = Outcome::Judged(Verdict::Explained);
-                }
+                };
+                name_without_evidence(diagnosis, leak);
             }
             _ => diagnosis.remarks.push(Remark::Measured { check, value }),
         }
