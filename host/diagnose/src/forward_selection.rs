@@ -240,7 +240,8 @@ impl<'a> ForwardSelection<'a> {
     ) -> CandidateFit {
         let known = |t: &CandidateFit| t.is_within_known_range(&self.library[t.candidate]);
         let of_speed = |t: &CandidateFit| self.library[t.candidate].traits.shown_by == Experiment::Speeds;
-        let one_speed = self.rows.have_one_speed();
+        // Beside another effect the rest is partly the inexactness of that one's law, which a constant friction may fit by chance.
+        let one_speed = self.chosen.is_empty() && self.rows.have_one_speed();
         let supported = |t: &CandidateFit| known(t) && !(one_speed && of_speed(t));
         if supported(winner) {
             return winner.clone();
