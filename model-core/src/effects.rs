@@ -216,6 +216,7 @@ impl Parameter {
     pub const fn largest(&self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
+
     /// A parameter that the force is proportional to.
     pub const fn amplitude(
         letter: &'static str,
