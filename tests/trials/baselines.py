@@ -1,173 +1,146 @@
 #!/usr/bin/env python3
-"""Other people's methods on the same recordings: PySINDy's sparse regression, and a Gaussian process as discrepancy.
+"""Other people's methods on the recordings of a sealed set, compared with the answers of `host diagnose`.
 
-    python3 -m venv .venv && .venv/bin/pip install pysindy scikit-learn
-    .venv/bin/python tests/trials/baselines.py DIR [--host target/release/host] [--most 60]
+    python3 -m venv .venv && .venv/bin/pip install -r tests/trials/requirements.txt
+    cargo run --release -p trials -- generate --set dev --n 345 --seed 20261129 -o DEVELOPMENT    (then `answer`, `score`)
+    cargo run --release -p trials -- generate --set dev --n 2000 --seed 7 -o TRAINING
+    .venv/bin/python tests/trials/baselines.py DIR --development DEVELOPMENT --training TRAINING
 
-DIR is an answered and scored set (its tables lie in work/). Writes DIR/guesses.json, which `trials score DIR` puts into the report:
+DIR and DEVELOPMENT are answered and scored. Writes DIR/guesses.json, which `trials score DIR` puts into the report. The methods, each
+described at the head of its file in tests/trials/methods:
 
-  pysindy  name of the term with the largest coefficient that pysindy.STLSQ keeps; columns are the catalogue's compact
-           equations at fixed shapes, freed of a base (polynomial and friction factor per file), each scaled to unit norm
-  gp       a Gaussian process over (pressure, contraction, direction, speed) fitted to what a plain table leaves of the campaign;
-           its error on the held-out recordings, N: it fits and names nothing
+  sparse       PySINDy's thresholded least squares on the catalogue's compact equations
+  knockoffs    knockpy on the same equations
+  discrepancy  emdcmp on the same equations
+  classifier   gradient boosting, trained on the bench (TRAINING)
+  process      a Gaussian process as discrepancy of a plain table: its error on held-out recordings
+
+Each method that names has one or two settings, which is chosen on DEVELOPMENT: most classes right there among the settings that name at most 2 % of
+the trials without an effect. Names are given for the trials that naming is judged on, and for those without an effect.
 """
 
 import argparse
 import json
-import math
 import os
-import subprocess
 import warnings
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 # Small problems: threads only wait for each other.
 for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(library, "1")
+warnings.filterwarnings("ignore")
 
 import numpy as np
-import pysindy
-import sklearn
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-NAMES = [
-    "coulomb-friction", "pressure-friction", "viscous-damping", "stribeck-friction", "rate-power", "stress-relaxation",
-    "log-creep", "cyclic-softening", "thermal-softening", "force-drift", "sensor-delay", "inertia", "mullins-softening",
-    "presliding-hysteresis", "breakaway-friction",
-]
+from methods import classifier, discrepancy, knockoffs, process, sparse
+from methods.recordings import Columns, read
+
+FALSE_ALARMS = 0.02
+# A trial is visible as in src/score.rs: a stiff base leaves half a noise deviation of the effect.
+VISIBLE = 0.5
 
 
-def read(path):
-    """Time (s), pressure (Pa), stroke (m), force (N)."""
-    rows = np.genfromtxt(path, delimiter=",", skip_header=1)[:, :4]
-    return rows * [1.0, 1e3, 1e-3, 1.0]
+class Trial:
+    def __init__(self, directory, id, outcome=None):
+        self.id, self.directory = f"{id:04}", directory
+        self.truth = json.loads((directory / "sealed" / self.id / "truth.json").read_text())
+        self.stratum = self.truth["stratum"]
+        self.is_null = self.stratum.startswith("null")
+        self.outcome = outcome
+        self.rest_length = self.truth["bench"]["muscle"]["geometry"]["rest_length"]
+        self.effect = self.truth["effects"][0]["name"] if self.truth["effects"] else ""
+        self.campaign = sorted((directory / "trials" / self.id).glob("*.csv"))
+
+    def is_visible(self):
+        return any(e["left_stiff_N"] >= VISIBLE * self.truth["noise_N"] for e in self.truth["effects"])
+
+    def is_judged(self):
+        return self.stratum in ("single", "decoy") and self.outcome["visible"] and self.outcome["amplitude_pct"] >= 2.0
 
 
-def columns(files, rest_length):
-    """Residual and library of all files, both freed of the base, rows thinned."""
-    residuals, libraries = [], []
-    largest = turns = relaxed = last_u = 0.0
-    way, travel = 1.0, 0.0
-    top = max(np.max(r[:, 3]) for r in files)
-    for rows in files:
-        if len(rows) < 60 or np.max(rows[:, 1]) < 20e3:
+METHODS = {"sparse": sparse, "knockoffs": knockoffs, "discrepancy": discrepancy, "classifier": classifier}
+
+
+def evidence(trial):
+    """The evidence of the methods that need no training, by method; for the classifier its features."""
+    files = [read(f) for f in trial.campaign]
+    columns = Columns(files, trial.rest_length)
+    found = {key: METHODS[key].evidence(columns) for key in ("sparse", "knockoffs", "discrepancy")}
+    return {**found, "classifier": classifier.features(files, columns, trial.rest_length)}
+
+
+def features(trial):
+    files = [read(f) for f in trial.campaign]
+    return classifier.features(files, Columns(files, trial.rest_length), trial.rest_length)
+
+
+def scored(directory):
+    """Trials that names are given for, and the class of each effect."""
+    report = json.loads((directory / "report.json").read_text())
+    trials = [Trial(directory, t["outcome"]["id"], t["outcome"]) for t in report["trials"]]
+    return [t for t in trials if t.is_null or t.is_judged()], report
+
+
+def chosen(method, trials, found, classes):
+    """The setting with most classes right among those that keep to the bound of false alarms."""
+    class_of = lambda name: classes.get(name, name)
+
+    def rank(setting):
+        names = [method.name(f, setting) for f in found]
+        alarms = np.mean([n != "" for n, t in zip(names, trials) if t.is_null])
+        right = np.mean([class_of(n) == class_of(t.effect) for n, t in zip(names, trials) if not t.is_null])
+        return min(0.0, FALSE_ALARMS - float(alarms)), float(right)
+
+    return max(method.SETTINGS, key=rank)
+
+
+def held_out_errors(directory, report, host, most):
+    """Errors of the Gaussian process where a gain is possible, N."""
+    errors = {}
+    for t in report["trials"]:
+        outcome, held = t["outcome"], t["held_out"]
+        if len(errors) >= most or outcome["stratum"] not in ("single", "decoy") or not outcome["visible"] or held is None:
             continue
-        keep = max(len(rows) // 500, 1)
-        rows = rows.tolist()
-        base, library, force = [], [], []
-        for i in range(2, len(rows) - 2):
-            a, b, r = rows[i - 2], rows[i + 2], rows[i]
-            dt = max(b[0] - a[0], 1e-6)
-            v = (b[2] - a[2]) / dt
-            acceleration = (b[2] - 2 * r[2] + a[2]) / (0.25 * dt * dt)
-            step = r[0] - rows[i - 1][0]
-            if abs(v) > 1e-5 * rest_length and (v > 0) != (way > 0):
-                way, travel, turns = math.copysign(1.0, v), 0.0, turns + 0.5
-            travel += abs(v) * step
-            u = r[2] / rest_length
-            relaxed = (relaxed + u - last_u) * math.exp(-step / 30.0)
-            last_u = u
-            new = u > largest
-            largest = max(largest, u)
-            if i % keep:
-                continue
-            s, f, p = way, r[3] / top, r[1] / 5e5
-            base.append([1, u, u**2, u**3, u**4, s * f])
-            library.append([
-                -s, -s * p, -v / rest_length, -s * np.exp(-abs(v) / (0.02 * rest_length)),
-                -s * f * (abs(v) / rest_length) ** 0.3, relaxed, f * np.log1p(r[0] - rows[0][0]), f * np.log1p(turns),
-                f * (1 - np.exp(-r[0] / 600.0)), r[0] / 1000.0, (b[3] - a[3]) / dt / top, acceleration / rest_length,
-                u if new else 0.0, s * f * np.exp(-travel / (0.01 * rest_length)),
-                s * np.exp(-travel / (0.003 * rest_length)),
-            ])
-            force.append(r[3])
-        if len(force) < 20:
-            continue
-        q, _ = np.linalg.qr(np.array(base))
-        free = lambda m: m - q @ (q.T @ m)
-        residuals.append(free(np.array(force)))
-        libraries.append(free(np.array(library)))
-    return np.concatenate(residuals), np.vstack(libraries)
-
-
-def sindy(files, rest_length):
-    """The name that PySINDy gives."""
-    y, a = columns(files, rest_length)
-    norms = np.linalg.norm(a, axis=0)
-    norms[norms < 1e-9] = np.inf
-    optimizer = pysindy.STLSQ(threshold=0.1 * np.linalg.norm(y), alpha=1e-6, max_iter=20)
-    optimizer.fit(a / norms, y.reshape(-1, 1))
-    weights = np.abs(np.ravel(optimizer.coef_))
-    return NAMES[int(np.argmax(weights))] if weights.max() > 0 else ""
-
-
-def predict(host, table, files, out):
-    """Rows with the table's force, file by file."""
-    subprocess.run([host, "predict", "--quiet", "--table", table, *files, "-o", out], check=True, capture_output=True)
-    lines = Path(out).read_text().splitlines()
-    head = lines[0].split(",")
-    at = {name: head.index(name) for name in ["time_s", "pressure_kPa", "displacement_mm", "force_N", "force_model_N"]}
-    tables = {}
-    for line in lines[1:]:
-        cells = line.split(",")
-        try:
-            tables.setdefault(cells[0], []).append([float(cells[i]) for i in at.values()])
-        except ValueError:
-            continue
-    return [np.array(t) for t in tables.values()]
-
-
-def features(t, rest_length):
-    v = np.gradient(t[:, 2] * 1e-3, t[:, 0]) / rest_length
-    return np.column_stack([t[:, 1] / 300.0, t[:, 2] * 10e-3 / rest_length, np.sign(v), np.log10(np.abs(v) + 1e-6)])
-
-
-def gaussian_process(host, work, campaign, held_out, rest_length):
-    """Error on held-out recordings of a plain table with a Gaussian process on top, N."""
-    table = work / "plain.pam"
-    if not table.exists() or not held_out:
-        return None
-    parts = predict(host, table, [*campaign, *held_out], work / "predicted.csv")
-    seen, unseen = parts[: len(campaign)], parts[len(campaign):]
-    seen = [t for t in seen if len(t) > 10 and np.max(t[:, 1]) > 20.0]
-    x = np.vstack([features(t, rest_length) for t in seen])
-    y = np.concatenate([t[:, 3] - t[:, 4] for t in seen])
-    pick = np.linspace(0, len(y) - 1, min(len(y), 350)).astype(int)
-    scale = np.std(y[pick]) or 1.0
-    kernel = ConstantKernel(1.0) * RBF([1.0] * 4, (0.05, 50.0)) + WhiteKernel(0.1)
-    process = GaussianProcessRegressor(kernel, n_restarts_optimizer=0, random_state=0).fit(x[pick], y[pick] / scale)
-    errors = [(t[:, 3] - t[:, 4] - scale * process.predict(features(t, rest_length)))[::3] for t in unseen]
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+        if held["plain_N"] - held["twin_N"] > 0.5 * held["twin_N"]:
+            trial = Trial(directory, outcome["id"], outcome)
+            held_out = sorted((directory / "sealed" / trial.id / "held_out").glob("*.csv"))
+            error = process.held_out_error(host, directory / "work" / trial.id, trial.campaign, held_out, trial.rest_length)
+            if error is not None:
+                errors[trial.id] = error
+    return errors
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("set", type=Path)
+    arguments.add_argument("--development", type=Path, required=True, help="an answered and scored development set")
+    arguments.add_argument("--training", type=Path, required=True, help="a generated set for the classifier")
     arguments.add_argument("--host", default="target/release/host")
     arguments.add_argument("--most", type=int, default=60, help="most trials for the Gaussian process")
     a = arguments.parse_args()
-    report = json.loads((a.set / "report.json").read_text())
-    guesses = {"pysindy": {}, "gp_N": {}, "versions": f"PySINDy {pysindy.__version__}, scikit-learn {sklearn.__version__}"}
-    for trial in report["trials"]:
-        outcome, held = trial["outcome"], trial["held_out"]
-        if outcome["stratum"] not in ("single", "decoy") or not outcome["visible"]:
-            continue
-        id = f"{outcome['id']:04}"
-        truth = json.loads((a.set / "sealed" / id / "truth.json").read_text())
-        rest_length = truth["bench"]["muscle"]["geometry"]["rest_length"]
-        campaign = sorted((a.set / "trials" / id).glob("*.csv"))
-        if outcome["amplitude_pct"] >= 2.0:
-            guesses["pysindy"][id] = sindy([read(f) for f in campaign], rest_length)
-        possible = held is not None and held["plain_N"] - held["twin_N"] > 0.5 * held["twin_N"]
-        if possible and len(guesses["gp_N"]) < a.most:
-            held_out = sorted((a.set / "sealed" / id / "held_out").glob("*.csv"))
-            error = gaussian_process(a.host, a.set / "work" / id, campaign, held_out, rest_length)
-            if error is not None:
-                guesses["gp_N"][id] = error
+    trials, report = scored(a.set)
+    development, _ = scored(a.development)
+    training = [Trial(a.training, int(p.name)) for p in sorted((a.training / "sealed").iterdir())]
+    training = [t for t in training if t.is_null or t.stratum in ("single", "decoy")]
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        found, tuning = list(pool.map(evidence, trials)), list(pool.map(evidence, development))
+        x = np.array(list(pool.map(features, training, chunksize=8)))
+    trained = classifier.Classifier(x, [t.effect if t.is_visible() else "" for t in training])
+    for rows in (found, tuning):
+        for row, chances in zip(rows, trained.evidence(np.array([r["classifier"] for r in rows]))):
+            row["classifier"] = chances
+    methods = []
+    for key, method in METHODS.items():
+        setting = chosen(method, development, [row[key] for row in tuning], report["classes"])
+        names = {t.id: method.name(row[key], setting) for t, row in zip(trials, found)}
+        methods.append({"method": method.LABEL, "names": names})
+        print(f"{method.LABEL}: setting {setting}, {sum(n != '' for n in names.values())} of {len(names)} trials named")
+    guesses = {"methods": methods, "training": len(training), "development": len(development),
+               "gp_N": held_out_errors(a.set, report, a.host, a.most), "gp": process.LABEL}
     (a.set / "guesses.json").write_text(json.dumps(guesses, indent=1) + "\n")
-    print(f"{len(guesses['pysindy'])} names by PySINDy, {len(guesses['gp_N'])} Gaussian processes: {a.set / 'guesses.json'}")
+    print(f"{len(guesses['gp_N'])} Gaussian processes: {a.set / 'guesses.json'}")
 
 
 if __name__ == "__main__":
-    warnings.filterwarnings("ignore")
     main()

@@ -2,7 +2,7 @@
 """Other methods on the pairs of the comparison with a reference.
 
     cargo run --release -p trials -- reference --short --pairs 20 -o DIR
-    python3 -m venv .venv && .venv/bin/pip install -r tests/trials/reference_requirements.txt
+    python3 -m venv .venv && .venv/bin/pip install -r tests/trials/requirements.txt
     .venv/bin/python tests/trials/reference_baselines.py DIR [--page docs/src/proof-reference-others.md]
 
 DIR/pairs.jsonl holds each pair as mean forces by run, mounting, direction and bin of pressure, and what a change of unit size adds.

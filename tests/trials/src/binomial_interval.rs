@@ -1,7 +1,7 @@
 //! Exact binomial intervals (C. J. Clopper, E. S. Pearson, doi 10.1093/biomet/26.4.404).
 
 /// Probability of at most `k` of `n` at chance `p`.
-fn at_most(k: usize, n: usize, p: f64) -> f64 {
+pub fn at_most(k: usize, n: usize, p: f64) -> f64 {
     if p <= 0.0 {
         return 1.0;
     }

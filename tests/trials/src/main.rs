@@ -22,6 +22,7 @@ mod maps;
 mod martens;
 mod names;
 mod oracle;
+mod paired_test;
 mod progress;
 mod proof_page;
 mod queue;

@@ -19,7 +19,7 @@ const INTRODUCTION: &str = "# Sealed trials\n\n\
     cargo run --release -p trials -- prove -o DIR\n\
     cargo run --release -p trials -- oracle DIR\n\
     cargo run --release -p trials -- again DIR\n\
-    python3 tests/trials/baselines.py DIR\n\
+    python3 tests/trials/baselines.py DIR --development DEV --training TRAINING\n\
     cargo run --release -p trials -- score DIR --page docs/src/proof.md\n\
     ```\n\n\
     The bounds were set before the seed was drawn; a missed bound is reported as missed. Rates have exact 95 % intervals. An effect counts \

@@ -1,5 +1,6 @@
 //! The report of a set as Markdown: the figures by protocol, tables by class and effect, and a list of every failure.
 
+use crate::baselines::{self, Line, Others};
 use crate::figures::{Figures, Scored, big_and_visible};
 use crate::limits::said;
 use crate::names::{CLASSES, class};
@@ -10,9 +11,9 @@ use crate::spec::Stratum;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-type Line = (&'static str, &'static str, fn(&Figures) -> String);
+type Row = (&'static str, &'static str, fn(&Figures) -> String);
 
-const LINES: [Line; 36] = [
+const LINES: [Row; 36] = [
     ("False alarms, clean nulls", "0", |f| f.false_alarms_clean.to_string()),
     ("False alarms, nasty nulls", "0", |f| f.false_alarms_nasty.to_string()),
     ("Nulls not called consistent", "", |f| f.nulls_not_consistent.to_string()),
@@ -76,7 +77,7 @@ pub fn detection(all: &[Scored]) -> Vec<(f64, f64, Rate)> {
 }
 
 /// The report as Markdown.
-pub fn markdown(title: &str, all: &[Scored], baselines: &[(String, Rate, Rate)]) -> String {
+pub fn markdown(title: &str, all: &[Scored], baselines: &[Line], others: Option<&Others>) -> String {
     let mut m = format!("# {title}\n\nWritten by `trials score`; nothing here is typed by hand.\n\n");
     let every: Vec<&Scored> = all.iter().collect();
     let mut columns = vec![("all", Figures::of(&every))];
@@ -106,11 +107,7 @@ pub fn markdown(title: &str, all: &[Scored], baselines: &[(String, Rate, Rate)])
     for (a, b, rate) in detection(all) {
         let _ = writeln!(m, "| {a} to {b} | {rate} |");
     }
-    m.push_str("\n## Comparison with simpler methods (visible effects of 2 % and more)\n\n| method | exact | class |\n| --- | --- | --- |\n");
-    let _ = writeln!(m, "| this tool | {} | {} |", columns[0].1.exact, columns[0].1.class_right);
-    for (name, exact, class) in baselines {
-        let _ = writeln!(m, "| {name} | {exact} | {class} |");
-    }
+    baselines::write(&mut m, baselines, &columns[0].1, others);
     m.push_str("\n## Calibration: stated probability and frequency\n\n| mean stated probability | exact | right class | names |\n| --- | --- | --- | --- |\n");
     for (stated, exact, near, n) in &columns[0].1.reliability {
         let _ = writeln!(m, "| {stated:.2} | {exact:.2} | {near:.2} | {n} |");

@@ -1,8 +1,10 @@
 //! Opening the seals: the score of every answer, and the report.
 
 use crate::figures::{Figures, Scored};
+use crate::names::{SINGLES, class};
 use crate::{answer, baselines, fitted, ledger, locate, report, score, second_round};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::Path;
 
@@ -32,7 +34,7 @@ pub fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<Scored>, Box
             }
         }
     }
-    let baselines = baselines::all(set, &truths, &scored)?;
+    let baselines = baselines::all(set, &truths, &scored);
     let drawn = ledger.drawn.max(ledger.truths.len());
     let share = if truths.len() < drawn { format!(" (the first of {drawn} drawn)") } else { String::new() };
     let title = format!(
@@ -41,8 +43,9 @@ pub fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<Scored>, Box
         truths.len(),
         ledger.tool
     );
-    let mut text = report::markdown(&title, &scored, &baselines);
-    if let Some((process, tool, n)) = baselines::Others::read(set).and_then(|o| o.gains(&scored)) {
+    let others = baselines::Others::read(set);
+    let mut text = report::markdown(&title, &scored, &baselines, others.as_ref());
+    if let Some((process, tool, n)) = others.as_ref().and_then(|o| o.gains(&scored)) {
         let at = text.find("\n## Calibration").unwrap_or(text.len());
         let line = format!(
             "\nMedian held-out gain on the {n} single effects where a gain was possible: a Gaussian process over pressure, contraction, \
@@ -61,6 +64,7 @@ pub fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<Scored>, Box
         "schema": "pam-trials/1",
         "set": ledger.set,
         "tool": ledger.tool,
+        "classes": SINGLES.iter().map(|(effect, _)| (*effect, class(effect))).collect::<BTreeMap<_, _>>(),
         "all": Figures::of(&every),
         "A": per("A"),
         "D": per("D"),
