@@ -4,7 +4,7 @@
 //! cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET…
 //! ```
 //! Each `SET` is a directory as `trials generate` and `trials answer` make it (`answers/ID.json`, `sealed/ID/truth.json`); use development
-//! sets only. Fits `logit p = A + B logit(model_weight) + C logit(explained)` by penalised maximum likelihood and prints the constants of
+//! or opened sets only. Fits `p = w^B q`, `logit q = A + C logit(explained)`, by penalised maximum likelihood and prints the constants of
 //! `host/diagnose/src/criteria/uncertainty.rs`, with log score and calibration error found by leaving out every fifth trial in turn.
 
 use std::path::Path;
@@ -15,13 +15,20 @@ use serde_json::Value;
 /// One name that was given.
 struct Name {
     trial: usize,
-    features: [f64; 3],
+    /// Model weight among its competitors.
+    weight: f64,
+    /// Logarithm of the odds of the share explained.
+    explained: f64,
     right: bool,
 }
 
+/// As in `calibration.rs`.
+fn within(x: f64) -> f64 {
+    x.clamp(0.01, 0.99)
+}
+
 fn logit(x: f64) -> f64 {
-    let x = x.clamp(0.01, 0.99);
-    (x / (1.0 - x)).ln()
+    (within(x) / (1.0 - within(x))).ln()
 }
 
 fn read(path: &Path) -> Option<Value> {
@@ -51,7 +58,8 @@ fn names(set: &Path, first_trial: usize) -> Vec<Name> {
             };
             found.push(Name {
                 trial: first_trial + trial,
-                features: [1.0, logit(model_weight), logit(explained)],
+                weight: within(model_weight),
+                explained: logit(explained),
                 right: hidden.contains(&effect),
             });
         }
@@ -59,25 +67,29 @@ fn names(set: &Path, first_trial: usize) -> Vec<Name> {
     found
 }
 
-fn probability(c: &[f64; 3], x: &[f64; 3]) -> f64 {
-    1.0 / (1.0 + (-(c[0] * x[0] + c[1] * x[1] + c[2] * x[2])).exp())
+/// Probability that the truth is among the competitors, and of this name.
+fn probabilities([a, b, c]: &[f64; 3], n: &Name) -> (f64, f64) {
+    let among = 1.0 / (1.0 + (-(a + c * n.explained)).exp());
+    (among, (n.weight.powf(*b) * among).clamp(1e-4, 1.0 - 1e-4))
 }
 
 /// Penalised maximum likelihood by gradient steps; towards the uncalibrated model weight.
 fn fit(names: &[&Name]) -> [f64; 3] {
-    let prior = [0.0, 1.0, 0.0];
+    let prior = [2.0, 1.0, 0.0];
     let mut c = prior;
     let rate = 2.0 / (names.len() as f64 * 12.0 + 2.0);
-    for _ in 0..20_000 {
+    for _ in 0..50_000 {
         let mut slope = [0.0; 3];
         for n in names {
-            let off = probability(&c, &n.features) - f64::from(u8::from(n.right));
-            for (s, x) in slope.iter_mut().zip(&n.features) {
-                *s += off * x;
+            let (among, p) = probabilities(&c, n);
+            // Of the log-likelihood against ln p.
+            let along = if n.right { 1.0 } else { -p / (1.0 - p) };
+            for (s, x) in slope.iter_mut().zip([1.0 - among, n.weight.ln(), (1.0 - among) * n.explained]) {
+                *s += along * x;
             }
         }
         for k in 0..3 {
-            c[k] -= rate * (slope[k] + 2.0 * (c[k] - prior[k]));
+            c[k] += rate * (slope[k] - 2.0 * (c[k] - prior[k]));
         }
     }
     c
@@ -117,12 +129,11 @@ fn main() -> ExitCode {
             let c = fit(&others);
             all.iter()
                 .filter(move |n| n.trial % 5 == k)
-                .map(move |n| (probability(&c, &n.features), n.right))
+                .map(move |n| (probabilities(&c, n).1, n.right))
                 .collect::<Vec<_>>()
         })
         .collect();
-    let plain: Vec<(f64, bool)> =
-        all.iter().map(|n| (1.0 / (1.0 + (-n.features[1]).exp()), n.right)).collect();
+    let plain: Vec<(f64, bool)> = all.iter().map(|n| (n.weight, n.right)).collect();
     let (log, error) = quality(&left_out);
     let (log_plain, error_plain) = quality(&plain);
     println!("{} names, {} of them right", all.len(), all.iter().filter(|n| n.right).count());
