@@ -6,7 +6,7 @@ use pam_data::error::Error;
 use super::{mode, state};
 use crate::error::DeviceCode;
 
-/// The message about a fault.
+/// The message about a fault. Long because it is a table with one row for each fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultMessage {
     /// The stable name, for logs and scripts.
@@ -19,7 +19,7 @@ pub struct FaultMessage {
     pub unit: &'static str,
 }
 
-/// The message about a fault.
+/// The message about a fault. Long because it is a table with one row for each fault.
 #[must_use]
 pub fn fault(fault: Fault) -> FaultMessage {
     let (name, cause, remedy, unit) = match fault {

@@ -8,7 +8,7 @@ use pam_data::pluralise::pluralise;
 use super::{fault, mode, side, state};
 use crate::error::DeviceCode;
 
-/// A refusal as an error: what was refused, why, what to do.
+/// A refusal as an error: what was refused, why, what to do. Long because it is a table with one row for each refusal.
 #[must_use]
 pub fn refused(request: &str, refusal: Refusal) -> Error {
     let (why, help) = match refusal {
