@@ -160,6 +160,7 @@ fi
 if require "language of pages and sources" npm nodejs npm; then
     step "language of pages and sources" language
 fi
+step "subjects of commits" bash tests/commits.sh
 if require "picture of the crates" python3 python3; then
     step "picture of the crates" python3 tests/crates.py --check
 fi
