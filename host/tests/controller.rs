@@ -244,7 +244,7 @@ fn every_variable_of_the_loop_is_traced_and_they_fit_together() {
     let bench = Bench::start("trace");
     bench.table("mini.pam", 76.5);
     bench.done(&["flash", "mini.pam"]);
-    let own = "pressure,stroke,force,speed,direction,asked,wanted-force,feed-forward,trim,wanted-pressure,command,model-pressure,\
+    let own = "pressure,stroke,force,speed,direction,setpoint,force-demand,feed-forward,trim,pressure-demand,command,model-pressure,\
                model-force,state,step-time";
     let trace = traced(&bench, own);
     let columns = trace["columns"].as_object().unwrap();
@@ -270,9 +270,9 @@ fn every_variable_of_the_loop_is_traced_and_they_fit_together() {
     assert!(!(0.0..1e3).contains(column("force_N").last().unwrap()), "{:?}", column("force_N"));
     let last = records - 4;
     let at = |name: &str| column(name)[last];
-    assert_eq!((at("asked"), at("wanted_force_N")), (40.0, 40.0));
+    assert_eq!((at("setpoint"), at("force_demand_N")), (40.0, 40.0));
     let near = |a: &str, b: f64, within: f64| assert!((at(a) - b).abs() < within, "{a}: {} and {b}", at(a));
-    near("wanted_pressure_Pa", at("feed_forward_Pa") + at("trim_Pa"), 5.0);
+    near("pressure_demand_Pa", at("feed_forward_Pa") + at("trim_Pa"), 5.0);
     near("model_pressure_Pa", at("pressure_Pa"), 20e3);
     near("command_Pa", at("pressure_Pa"), 60e3);
     // The table is an example of this kind of muscle, not a fit of this one.

@@ -376,7 +376,7 @@ mod tests {
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(
             lines[0],
-            "time_s,pressure_Pa,displacement_m,force_N,pressure_command_Pa,wanted_Pa,table_N,asked,state,mode,tick"
+            "time_s,pressure_Pa,displacement_m,force_N,pressure_command_Pa,pressure_demand_Pa,table_N,setpoint,state,mode,tick"
         );
         assert_eq!(lines[1], "1.000500,33333.332,0,1.5,0,0,0,1,running,force,1000");
         assert_eq!(lines.len(), 3);

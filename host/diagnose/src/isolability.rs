@@ -53,7 +53,7 @@ pub struct Isolability {
     /// Share of its trace's energy that flexible tables cannot imitate.
     pub visible: f64,
     /// Effects whose trace has a cosine above 0.9 with this one's, after the tables are refitted; with that cosine.
-    pub not_told_from: Vec<(String, f64)>,
+    pub confounded_with: Vec<(String, f64)>,
 }
 
 /// For a planned protocol: which effects of the library it shows, and which of them it cannot distinguish.
@@ -96,13 +96,13 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
         .iter()
         .enumerate()
         .map(|(i, law)| {
-            let mut not_told_from: Vec<(String, f64)> = (0..laws.len())
+            let mut confounded_with: Vec<(String, f64)> = (0..laws.len())
                 .filter(|j| *j != i && traces[i].0 > INVISIBLE && traces[*j].0 > INVISIBLE)
                 .map(|j| (laws[j].name().to_owned(), cosine(&traces[i].1, &traces[j].1).abs()))
                 .filter(|(_, c)| *c > INDISTINGUISHABLE)
                 .collect();
-            not_told_from.sort_by(|a, b| b.1.total_cmp(&a.1));
-            Isolability { effect: law.name().to_owned(), visible: traces[i].0, not_told_from }
+            confounded_with.sort_by(|a, b| b.1.total_cmp(&a.1));
+            Isolability { effect: law.name().to_owned(), visible: traces[i].0, confounded_with }
         })
         .collect())
 }
@@ -132,7 +132,7 @@ mod tests {
         let confused = |speeds: &[f64]| {
             let rows = isolability(&protocol(speeds), &muscle).expect("playable");
             let row = rows.iter().find(|r| r.effect == "viscous-damping").expect("in the library");
-            row.not_told_from.iter().any(|(n, _)| n == "coulomb-friction")
+            row.confounded_with.iter().any(|(n, _)| n == "coulomb-friction")
         };
         assert!(confused(&[0.2]));
         assert!(!confused(&[0.1, 0.4, 1.6]));

@@ -42,7 +42,7 @@ pub(crate) fn page(engine: &Engine, course: &[Done], result: &document::Campaign
 
 /// Whether the table has the target error and the model explains the recordings.
 fn settled(engine: &Engine, result: &document::Campaign) -> bool {
-    let error = result.table.as_ref().and_then(|t| Some((t.predicted_error_pct?, t.wanted_error_pct)));
+    let error = result.table.as_ref().and_then(|t| Some((t.predicted_error_pct?, t.target_error_pct)));
     let known = error.is_none_or(|(predicted, wanted)| predicted <= wanted);
     let explained =
         |d: &Diagnosis| d.judged() && matches!(d.verdict(), Verdict::Consistent | Verdict::Explained);
@@ -126,7 +126,7 @@ fn time_section(engine: &Engine, course: &[Done], result: &document::Campaign) -
     known.extend(result.table.as_ref().and_then(|t| Some((result.bench_s, t.predicted_error_pct?))));
     if known.len() > 1 {
         let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
-        let wanted = result.table.as_ref().map_or(0.0, |t| t.wanted_error_pct);
+        let wanted = result.table.as_ref().map_or(0.0, |t| t.target_error_pct);
         let panel =
             Panel::new(Axis::new("time", "s"), Axis::new("expected error", "% of blocked force").from_zero())
                 .line("expected", Colour::Series(0), &x, &y)
@@ -161,7 +161,7 @@ fn table_section(result: &document::Campaign) -> Section {
         ]);
     }
     if let Some(error) = t.predicted_error_pct {
-        let wanted = t.wanted_error_pct;
+        let wanted = t.target_error_pct;
         table.row([
             "expected standard error between the tested pressures and strokes, if the model is right"
                 .to_owned(),

@@ -65,12 +65,12 @@ pub(crate) struct Planned<'a> {
     /// Share of its energy that tables free over pressure cannot imitate.
     pub visible: f64,
     /// Effects that the protocol does not distinguish from it, with the cosine.
-    pub not_told_from: &'a [(String, f64)],
+    pub confounded_with: &'a [(String, f64)],
 }
 
 impl<'a> Planned<'a> {
     pub(crate) fn of(row: &'a Isolability) -> Self {
-        Self { effect: &row.effect, visible: row.visible, not_told_from: &row.not_told_from }
+        Self { effect: &row.effect, visible: row.visible, confounded_with: &row.confounded_with }
     }
 }
 

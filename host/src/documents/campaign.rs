@@ -39,7 +39,6 @@ pub(crate) struct Step {
     /// Why it was chosen, in one sentence.
     pub why: String,
     /// What it showed, as text.
-    #[serde(rename = "told")]
     pub finding: String,
     pub file: String,
     pub rows: u64,
@@ -77,7 +76,7 @@ pub(crate) struct Table {
     /// Predicted standard error on unseen pressures and strokes, percent of the blocked force.
     pub predicted_error_pct: Option<f64>,
     /// Its targets.
-    pub wanted_error_pct: f64,
+    pub target_error_pct: f64,
 }
 
 /// What is missing.

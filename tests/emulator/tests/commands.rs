@@ -161,7 +161,7 @@ fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_ro
     let steps = ["run", "--stroke", "steps 0.8 1.6 hold=2", "--seconds", "4", "-o", "stroke.csv", "--json"];
     stand.host(&steps);
     let path = stand.folder.path().join("stroke.csv");
-    let (asked, stroke) = (column(&path, "asked"), column(&path, "displacement_m"));
+    let (asked, stroke) = (column(&path, "setpoint"), column(&path, "displacement_m"));
     for end in [1_950, 3_950] {
         let late = &stroke[end - 300..end];
         let error = late.iter().map(|x| (x - asked[end - 1]).powi(2)).sum::<f64>() / late.len() as f64;
@@ -178,7 +178,7 @@ fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_ro
     let about = json(&stand.host(&run));
     assert_eq!(about["losses"]["samples"], 0);
     let path = stand.folder.path().join("force.csv");
-    let (asked, force) = (column(&path, "asked"), column(&path, "force_N"));
+    let (asked, force) = (column(&path, "setpoint"), column(&path, "force_N"));
     let wanted = |n: usize| 20.0 + 10.0 * (0.01 * (n as f64 / 2.5).floor()).sin();
     // The points of the file come out of the device at their times, joined anew within a hundredth of a newton.
     let far = |shift: usize| (0..2_000).map(|n| (asked[shift + n] - wanted(n)).abs()).fold(0.0, f64::max);
@@ -212,7 +212,7 @@ fn a_trace_is_armed_filled_inside_the_loop_and_read_out_over_a_serial_device() {
         "--trigger",
         "until-fault",
         "--variables",
-        "pressure,command,asked,force",
+        "pressure,command,setpoint,force",
     ]);
     // A limit that the run must cross: the trace shows what led to the fault.
     stand.host(&["device", "settings", "--set", "limits.force_n=20"]);
@@ -230,7 +230,7 @@ fn a_trace_is_armed_filled_inside_the_loop_and_read_out_over_a_serial_device() {
     assert!(last("force_N") > 20.0, "{}", last("force_N"));
     let csv = stand.host(&["device", "trace", "--read"]);
     assert_eq!(csv.lines().count(), records + 1);
-    assert_eq!(csv.lines().next(), Some("time_s,pressure_Pa,command_Pa,asked,force_N"));
+    assert_eq!(csv.lines().next(), Some("time_s,pressure_Pa,command_Pa,setpoint,force_N"));
     let vented = json(&stand.host(&["vent", "--json"]));
     assert_eq!(vented["state"], "fault");
 }

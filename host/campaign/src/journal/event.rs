@@ -94,7 +94,7 @@ pub enum Event {
         end_s: f64,
     },
     /// What a step showed.
-    #[serde(rename = "told")]
+    #[serde(rename = "finding", alias = "told")]
     Finding {
         /// Its number.
         number: u32,

@@ -82,11 +82,11 @@ pub(super) const COLUMNS: &[Column] = &[
     column!("displacement_m", "measured stroke, m", |s| side(s, 0, |x| x.stroke_m)),
     column!("force_N", "measured force, N", |s| side(s, 0, |x| x.force_n)),
     column!("pressure_command_Pa", "command to the regulator, Pa", |s| side(s, 0, |x| x.command_pa)),
-    column!("wanted_Pa", "wanted pressure: feed-forward and trim, Pa", |s| side(s, 0, |x| x
+    column!("pressure_demand_Pa", "demanded pressure: feed-forward and trim, Pa", |s| side(s, 0, |x| x
         .pressure_demand_pa)),
     column!("table_N", "force by the table at the measured pressure and stroke, N", |s| side(s, 0, |x| x
         .model_n)),
-    column!("asked", "setpoint, in the SI unit of the mode", |s| Cell::Number(s.setpoint)),
+    column!("setpoint", "setpoint, in the SI unit of the mode", |s| Cell::Number(s.setpoint)),
     column!("state", "disarmed, armed, running or fault", |s| Cell::Word(messages::state(s.state))),
     column!("mode", "what is controlled", |s| Cell::Word(messages::mode(s.mode))),
     column!("tick", "number of the control loop's tick", |s| Cell::Count(s.tick)),

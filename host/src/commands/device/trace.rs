@@ -22,7 +22,12 @@ pub(super) struct Arguments {
     #[command(flatten)]
     port: PortOption,
     /// What to record, separated by commas.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "pressure,force,asked,command")]
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        default_value = "pressure,force,setpoint,command"
+    )]
     variables: Vec<String>,
     /// Ticks from one record to the next.
     #[arg(long, value_name = "TICKS", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
@@ -61,11 +66,11 @@ const VARIABLES: [(&str, Variable, &str); 19] = [
     ("force", Variable::Force, "N"),
     ("speed", Variable::Speed, "m_per_s"),
     ("direction", Variable::Direction, ""),
-    ("asked", Variable::Setpoint, ""),
-    ("wanted-force", Variable::ForceDemand, "N"),
+    ("setpoint", Variable::Setpoint, ""),
+    ("force-demand", Variable::ForceDemand, "N"),
     ("feed-forward", Variable::FeedForward, "Pa"),
     ("trim", Variable::Trim, "Pa"),
-    ("wanted-pressure", Variable::PressureDemand, "Pa"),
+    ("pressure-demand", Variable::PressureDemand, "Pa"),
     ("command", Variable::Command, "Pa"),
     ("model-pressure", Variable::ModelPressure, "Pa"),
     ("model-force", Variable::ModelForce, "N"),

@@ -26,7 +26,8 @@ pub(super) fn run(table: &Path, file: &Path, json: Option<&Path>, console: &Cons
     if json != Some(Path::new("-")) {
         console.result(format!("{:<26}{:>9}   not distinguished from (cosine)", "effect", "visible"));
         for r in &rows {
-            let others: Vec<String> = r.not_told_from.iter().map(|(n, c)| format!("{n} ({c:.2})")).collect();
+            let others: Vec<String> =
+                r.confounded_with.iter().map(|(n, c)| format!("{n} ({c:.2})")).collect();
             let seen = if r.visible < 1e-5 { "no".to_owned() } else { format!("{:.2} %", 100.0 * r.visible) };
             console.result(format!("{:<26}{seen:>9}   {}", r.effect, others.join(", ")));
         }
