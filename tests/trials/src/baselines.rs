@@ -81,9 +81,9 @@ pub fn write(m: &mut String, lines: &[Line], tool: &Figures, others: Option<&Oth
     if let Some(o) = others {
         let _ = writeln!(
             m,
-            "\nThe classifier was trained on {} simulated trials with one effect or none. Settings of the other people's methods were chosen on \
-             {} trials of an opened development set: most classes right among the settings that name at most 2 % of the trials without an \
-             effect there. `tests/trials/methods` has a file for each method.",
+            "\nThe classifier was trained on {} simulated trials with one effect or none. Settings of other people's methods were chosen on {} \
+             trials of an opened development set: \"most right\" by the classes right there, \"few false alarms\" among the settings that name \
+             least often where there is no effect (at most 2 %, where a setting does so). `tests/trials/methods` has a file for each method.",
             o.training, o.development
         );
     }
