@@ -50,6 +50,7 @@ const ALLOWED: &[(&str, &str, &[&str])] = &[
 
 /// Libraries that only the named crates may use: the command line, the web server, the serial port.
 const RESTRICTED: &[(&str, &[&str])] = &[
+    // The program `virtual-bench` is built with the feature `cli`; its library does not use it.
     ("clap", &["host", "virtual-bench"]),
     ("axum", &["host"]),
     // The client of buckets waits for the network; it is built with the feature `buckets` only.

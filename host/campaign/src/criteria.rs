@@ -42,10 +42,14 @@ pub const SLOW_RAMP_SHARE: f64 = 0.04;
 pub const SAMPLE_HZ: f64 = 10.0;
 
 /// Target for the standard error of the table's force on unseen pressures and strokes, share of the blocked force. The model's own stated
-/// inexactness is as large (`pam_diagnose::criteria`, lack of fit).
-pub const TARGET_ERROR: f64 = 0.0015;
-/// Inexactness of the model that no number of rows averages out, share of the blocked force (as above).
-pub const INEXACTNESS: f64 = 0.0015;
+/// inexactness is as large.
+pub fn target_error() -> f64 {
+    inexactness()
+}
+/// Inexactness of the model that no number of rows averages out, share of the blocked force.
+pub fn inexactness() -> f64 {
+    pam_diagnose::criteria::lack_of_fit()
+}
 /// Least time between readings that count as independent, s. The diagnosis tests by whole blocks, of which a slow half-stroke is one; the
 /// memory of the noise replaces it where it is longer.
 pub const INDEPENDENT_S: f64 = 10.0;

@@ -21,7 +21,7 @@ use pam_fit::checks;
 use self::seen::{Seen, View};
 use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
 use crate::course::Course;
-use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, TARGET_ERROR};
+use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, target_error};
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
@@ -186,7 +186,7 @@ impl<'a> Design<'a> {
 
     fn compare(&self, seen: &Seen<'_>) -> Gain {
         let (old, new) = (&seen.before.errors, &seen.after.errors);
-        let wanted = (TARGET_ERROR * self.known.blocked).powi(2);
+        let wanted = (target_error() * self.known.blocked).powi(2);
         let nats = |(a, b): (&f64, &f64)| 0.5 * ((a + wanted) / (b + wanted)).ln();
         let mean = old.iter().zip(new).map(nats).sum::<f64>() / old.len().max(1) as f64;
         let mut gain = Gain {

@@ -2,9 +2,9 @@
 //!
 //! | question | module |
 //! | --- | --- |
-//! | what can the rig do | [`rig`], [`menu`], [`step`], [`course`] |
+//! | what can the rig do | [`rig`], [`menu`], [`step`], `course` |
 //! | what is known of the muscle's range | [`places`] |
-//! | what is a step expected to tell | [`information`] |
+//! | how much is a step expected to inform | `information` |
 //! | what to do next, and when to stop | [`engine`] |
 //! | what the operator does | [`instructions`], [`prompt`] |
 //! | is the recording good | [`watch`] |
@@ -31,11 +31,11 @@ pub mod bench;
 pub mod campaign;
 mod columns;
 pub mod controller;
-pub mod course;
-pub mod criteria;
+mod course;
+mod criteria;
 pub mod engine;
-pub mod hypothesis;
-pub mod information;
+mod hypothesis;
+mod information;
 pub mod instructions;
 pub mod journal;
 mod left_over;
@@ -47,4 +47,6 @@ pub mod rig;
 pub mod step;
 pub mod stroke_axis;
 pub mod watch;
-pub mod wording;
+mod wording;
+
+pub use criteria::target_error;

@@ -33,6 +33,12 @@ pub(crate) mod timeline;
 pub(crate) mod uncertainty;
 pub(crate) mod valve_pulses;
 
+/// Lack of fit of the base model with everything that it admits, share of the blocked force: for those who plan with it.
+#[must_use]
+pub fn lack_of_fit() -> f64 {
+    judgement::LACK_OF_FIT
+}
+
 /// The whole page, stage by stage in the order in which they decide.
 pub const PAGE: [Stage; 17] = [
     motion::CRITERIA,

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use pam_campaign::analysis::names;
 use pam_campaign::campaign::Done;
-use pam_campaign::criteria::TARGET_ERROR;
 use pam_campaign::engine::Engine;
+use pam_campaign::target_error;
 use pam_data::date;
 use pam_data::error::Result;
 use pam_data::output::write_whole;
@@ -107,7 +107,7 @@ pub(crate) fn document(engine: &Engine, course: &[Done], facts: &RunFacts<'_>) -
             mean_error_pct: s.mean_error_pct,
             left_out_pressure_mean_error_pct: s.left_out_pressure_mean_error_pct,
             predicted_error_pct: engine.predicted_error().filter(|e| e.is_finite()).map(percent),
-            target_error_pct: 100.0 * TARGET_ERROR,
+            target_error_pct: 100.0 * target_error(),
         }
     });
     let diagnosis = engine.diagnosis().map(|d| document::Diagnosis {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::Engine;
 use crate::analysis::sets;
-use crate::criteria::{INDEPENDENT_S, INEXACTNESS, NAMED, SURE, TARGET_ERROR, WORTHWHILE_NATS};
+use crate::criteria::{INDEPENDENT_S, NAMED, SURE, WORTHWHILE_NATS, inexactness, target_error};
 use crate::information::{Design, Gain, Knowledge};
 use crate::menu::menu;
 use crate::purpose::Purpose;
@@ -97,7 +97,7 @@ impl Engine {
             model: &findings.model,
             past: &past,
             levels: &levels,
-            sigma: noise.hypot(INEXACTNESS * blocked),
+            sigma: noise.hypot(inexactness() * blocked),
             independent_s: INDEPENDENT_S.max(memory),
             blocked,
             sets: &sets,
@@ -136,7 +136,7 @@ impl Engine {
 
     /// Whether all targets are met: the table's, and one name or none.
     fn settled(&self, error: f64, blocked: f64, doubts: &[f64]) -> bool {
-        let table_known = error <= TARGET_ERROR * blocked;
+        let table_known = error <= target_error() * blocked;
         let all_seen = doubts.iter().all(|d| *d < NAMED);
         let one_name = self.diagnosis.as_ref().is_some_and(|d| {
             d.judged() && d.missing.iter().all(|m| m.confusable_with.is_empty() && m.probability >= SURE)
