@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | the control step, one pure function | [`control`] |
 //! | pressure for force and stroke | [`modes`] |
-//! | a joint of two muscles: angle, stiffness, what can be had | [`pair`] |
+//! | a joint of two muscles: angle, stiffness, what is available | [`pair`] |
 //! | states and faults, each in one table | [`safety`] |
 //! | how faults are noticed | [`watch`] |
 //! | whether the table still describes the muscle | [`health`] |

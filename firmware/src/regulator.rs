@@ -176,7 +176,7 @@ impl RegulatorState {
         };
     }
 
-    /// Demands anew from where the muscle is; the model of line and muscle continues.
+    /// Demands again from where the muscle is; the model of line and muscle continues.
     pub fn demand_from(&mut self, pressure_pa: f32) {
         let Self { supplied_pa, model_pa, .. } = *self;
         self.begin(pressure_pa);

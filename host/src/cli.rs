@@ -92,7 +92,7 @@ enum Command {
     Stock(commands::stock::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
-    /// Plan recordings: protocols by what they are expected to tell, best first; or what a planned protocol can distinguish.
+    /// Plan recordings: protocols by their expected information, best first; or what a planned protocol can distinguish.
     Plan(commands::plan::Arguments),
     /// Record, check, fit and diagnose automatically: the program chooses each step of the campaign.
     Campaign(commands::campaign::Arguments),

@@ -121,7 +121,7 @@ impl Console {
         }
     }
 
-    /// A detail, on standard error, where `--verbose` asks for it.
+    /// A detail, on standard error, where `--verbose` requires it.
     pub fn detail(&self, text: impl Display) {
         if self.verbose {
             let _ = writeln!(std::io::stderr().lock(), "{}", said(text));

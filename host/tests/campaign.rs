@@ -133,7 +133,7 @@ fn a_rig_that_the_virtual_bench_does_not_have_is_refused() {
     assert!(said.contains("no hanging weight"), "{said}");
 }
 
-/// Setpoints arrive too late then, and steps are recorded in vain.
+/// Setpoints arrive too late then, and steps are recorded without use.
 #[test]
 fn a_speed_that_the_program_cannot_follow_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();

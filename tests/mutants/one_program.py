@@ -1,6 +1,6 @@
 """All changes of cargo-mutants compiled into one program. A variable of the environment selects the one that is in force.
 
-Building the tests anew for each of a thousand changes takes hours. Here every function that has changes gets a copy of its body for each:
+Building the tests again for each of a thousand changes takes hours. Here every function that has changes gets a copy of its body for each:
 
     fn halved(x: f32) -> f32 { match crate::change_in_force() { 1 => { x * 2.0 } 2 => { x % 2.0 } _ => { x / 2.0 } } }
 

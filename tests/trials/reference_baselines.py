@@ -13,7 +13,7 @@ the development half: most classes right among those settings that name at most 
   emdcmp      each change against no change by the empirical model discrepancy (Bemd): the change of least held-out risk, where its
               probability of less risk than no change is large enough; slow, so on a share of the pairs (--emd)
   boosting    scikit-learn's gradient boosting on features of the cells, trained on the pairs of simulated muscles (DIR/training.jsonl)
-  lisdd       localise, name, certify (arXiv 2606.23215, after its abstract: the text of the algorithm was not to be had): regions whose
+  lisdd       localise, name, certify (arXiv 2606.23215, after its abstract: the text of the algorithm was not available): regions whose
               energy of the residual is beyond the spread before, the term by exhaustive hold-out within them, a sample-split F-test
 """
 

@@ -39,7 +39,7 @@ pub(super) fn used(commits: u8) -> Store<MockFlash> {
     store
 }
 
-/// Runs an operation with the power cut at every one of its writes and erases, each torn in three ways; looks at what is
+/// Runs an operation with the power cut at every one of its writes and erases, each interrupted in three ways; looks at what is
 /// there after the power came back. Gives how many cuts were tried.
 pub(super) fn cut_everywhere(
     before: &MockFlash,

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | what can the rig do | [`rig`], [`menu`], [`step`], [`course`] |
 //! | what is known of the muscle's range | [`places`] |
-//! | what is a step expected to tell | [`information`] |
+//! | what information a step is expected to give | [`information`] |
 //! | what to do next, and when to stop | [`engine`] |
 //! | what the operator does | [`instructions`], [`prompt`] |
 //! | is the recording good | [`watch`] |

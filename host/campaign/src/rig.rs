@@ -39,7 +39,7 @@ impl Axis {
         matches!(self, Self::Line | Self::Commanded)
     }
 
-    /// Whether other held lengths than the present one can be had.
+    /// Whether other held lengths than the present one are possible.
     #[must_use]
     pub const fn positions(self) -> bool {
         matches!(self, Self::Prompt | Self::Line | Self::Commanded)

@@ -15,7 +15,7 @@ use super::baselines::{PriorDeviations, keeps};
 use super::criteria::baseline::{ELASTIC_DEVIATIONS, EXPECTED_DEVIATIONS, FRICTION_DEVIATIONS};
 use super::linear::{Sign, amplitudes, solve_symmetric};
 
-/// What evidence is weighed with.
+/// What the evaluation of evidence needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// Sum of the rows' weights.

@@ -311,7 +311,7 @@ fn viscous_damping_is_found_with_its_size() {
 #[test]
 fn what_is_given_is_fitted_and_judged_by_the_recordings() {
     let rubbed = recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign);
-    // What is there is found with its size whatever else was looked at …
+    // What is there is found with its size whatever else was tested …
     let d = diagnosed_with(&rubbed, &["coulomb-friction"]).expect("an answer");
     assert_eq!(names(&d), ["coulomb-friction"]);
     let m = &d.missing[0];

@@ -19,7 +19,7 @@ use crate::results::{self, Provenance};
 use crate::shard::Shard;
 use crate::work_item::{Inputs, WorkItem};
 
-/// The version of the stored results: a new one computes everything anew.
+/// The version of the stored results: a new one computes everything again.
 const FORMAT: u32 = 1;
 /// Failures that a summary lists; the table `failures` lists all.
 const MOST_LISTED: usize = 100;

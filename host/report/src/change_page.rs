@@ -92,7 +92,10 @@ fn changes(r: &ChangeReport) -> Section {
             wording::owner(m.owner)
         ));
         if !m.confusable_with.is_empty() {
-            section.text(format!("These recordings cannot tell it from {}.", m.confusable_with.join(", ")));
+            section.text(format!(
+                "These recordings cannot distinguish it from {}.",
+                m.confusable_with.join(", ")
+            ));
         }
         let apart = separate::named(m);
         if !apart.is_empty() {

@@ -11,7 +11,7 @@ pub enum Tone {
     Plain,
     /// As required.
     Good,
-    /// To be looked at.
+    /// To be checked.
     Caution,
     /// Wrong.
     Bad,

@@ -15,7 +15,7 @@ use tokio::task::JoinHandle;
 
 /// Time for the head of a request, and for its body.
 pub(super) const ARRIVAL: Duration = Duration::from_secs(10);
-/// Pause after the system refused a connection, for instance for want of file handles.
+/// Pause after the system refused a connection, for instance for lack of file handles.
 const REFUSED: Duration = Duration::from_millis(50);
 
 /// What is bounded.

@@ -1,4 +1,4 @@
-//! Checks of the bench: what dead weights, a rigid bar and a reference gauge tell, and what a diagnosis makes of it.
+//! Checks of the bench: what dead weights, a rigid bar and a reference gauge show, and what a diagnosis makes of it.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -198,7 +198,7 @@ fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
     }
 }
 
-/// Loops hardly tell a leak from a friction that differs between the directions, or from a gauge that reads too much.
+/// Loops hardly distinguish a leak from a friction that differs between the directions, or from a gauge that reads too much.
 #[test]
 fn a_closed_valve_says_whether_a_loss_of_pull_is_a_leak() {
     // The recordings do not show the smaller leak; the valve does.

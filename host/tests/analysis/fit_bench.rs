@@ -45,7 +45,7 @@ fn the_three_muscles_of_the_thesis() {
     }
 }
 
-/// Noise of force asks for stiff curves over pressure. Friction, which falls with pressure, must not become flatter by it: the mean of
+/// Noise of force requires stiff curves over pressure. Friction, which falls with pressure, must not become flatter by it: the mean of
 /// several noisy campaigns is the truth.
 #[test]
 fn noise_of_force_does_not_flatten_friction_over_pressure() {

@@ -180,7 +180,7 @@ fn one_held_length_determines_no_deadband() {
     assert!(found.summary.warnings.iter().any(|w| w.contains("one length")), "{:?}", found.summary.warnings);
 }
 
-/// A length that is read anew in each run is one length: three mountings determine no more coefficients than three lengths do, and a length
+/// A length that is read again in each run is one length: three mountings determine no more coefficients than three lengths do, and a length
 /// between them is predicted.
 #[test]
 fn a_mounting_whose_length_is_read_anew_in_each_run_is_one_length() {

@@ -8,11 +8,11 @@ use std::f64::consts::TAU;
 #[serde(default, deny_unknown_fields)]
 pub struct Rig {
     /// Spring rate of frame and couplings, N/m; 0 for rigid. The muscle pulls its frame along and is shorter than the
-    /// crosshead tells.
+    /// crosshead shows.
     pub stiffness: f64,
     /// Play of a joint, m: the muscle's end follows the crosshead only at the play's edges, which are soft.
     pub play: f64,
-    /// Zero error of the stroke, m: the muscle is shorter by this than the crosshead tells.
+    /// Zero error of the stroke, m: the muscle is shorter by this than the crosshead shows.
     pub offset: f64,
     /// Moving mass between muscle and cell, kg.
     pub mass: f64,

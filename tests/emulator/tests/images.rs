@@ -82,7 +82,7 @@ fn each_image_lies_where_its_boards_map_says() {
     check(&nucleo, include_str!("../../../firmware/memory/nucleo-f446re.x"));
 }
 
-/// The table that the tests of the Nucleo's image send. `TABLE=overwrite` writes it anew.
+/// The table that the tests of the Nucleo's image send. `TABLE=overwrite` rewrites it.
 #[test]
 fn the_tests_of_the_nucleo_send_the_example_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../nucleo/example-table.bin");

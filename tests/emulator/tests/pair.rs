@@ -85,7 +85,7 @@ fn what_cannot_be_had_is_refused_with_what_can() {
     let truth = Joint::new(&bench, 0.02, 0.002);
     assert!(truth.stiffness_at([380e3; 2], 0.0) < 0.01, "slack");
     let ends = [410e3, 620e3].map(|pascals| truth.stiffness_at([pascals; 2], 0.0));
-    eprintln!("{low:.2} to {high:.2} N·m/rad, in truth {ends:.2?}");
+    eprintln!("{low:.2} to {high:.2} N·m/rad, in fact {ends:.2?}");
     assert!((f64::from(low) / ends[0] - 1.0).abs() < 0.04 && (f64::from(high) / ends[1] - 1.0).abs() < 0.04);
     // Both ends are taken, and reached.
     for stiffness in [low + 0.2, high - 0.2] {

@@ -226,7 +226,7 @@ fn a_stiffness_that_the_torque_leaves_no_room_for_is_counted_as_saturated() {
     joint.pass(100);
     assert_eq!(joint.bench.controller.saturated_ticks(), before + 200, "both muscles in each tick");
     let [first, second] = joint.forces_n();
-    assert!(first < 100.0 && second > 1.0, "the forces can be had: {first} and {second}");
+    assert!(first < 100.0 && second > 1.0, "the forces can be reached: {first} and {second}");
 }
 
 #[test]

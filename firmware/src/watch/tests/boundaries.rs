@@ -147,7 +147,7 @@ fn a_muscle_is_not_vented_from_the_tick_after_its_time_on() {
         (time + 2, Fault::NotVented, vented),
         "two ticks beyond the time"
     );
-    // A command in between begins the time anew.
+    // A command in between restarts the time.
     let mut interrupted = vec![seen(vented + 1.0); ticks];
     interrupted[time as usize - 5].command.vent = false;
     assert_eq!(all(interrupted, &settings), []);
@@ -228,7 +228,7 @@ fn one_good_tick_begins_every_count_anew() {
     let follow = settings.watch.follow_pa;
     let apart = |miss: f32| Seen { expected_pa: 200e3, ..still(200e3 + miss, 0.0, 0.0) };
     let full = Seen { command: Command::VENT, ..still(settings.watch.vented_pa + 1.0, 0.0, 0.0) };
-    // At the limit: no pressure from which the time would begin anew.
+    // At the limit: no pressure from which the time would restart.
     let empty = Seen { command: Command::VENT, ..still(settings.watch.vented_pa, 0.0, 0.0) };
     let good = still(200e3, 0.0, 0.0);
     let cases = [

@@ -302,7 +302,7 @@ fn missing(what: &str, headers: impl Iterator<Item = String>, names: &[String]) 
             [(';', "semicolons"), ('|', "bars"), (' ', "blanks")].iter().find(|d| only.contains(d.0))
     {
         help = format!(
-            "the cells seem to be separated by {}; use commas or tabs, or say so in an import description (--import)",
+            "the cells seem to be separated by {}; use commas or tabs, or state it in an import description (--import)",
             delimiter.1
         );
     } else if let Some((name, near)) = near {

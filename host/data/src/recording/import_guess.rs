@@ -97,7 +97,7 @@ pub struct GuessedPattern {
 pub struct Guess {
     /// The file's name.
     pub file: String,
-    /// Rows that were looked at, and whether these are all.
+    /// Rows that were read, and whether these are all.
     pub rows: usize,
     /// See `rows`.
     pub whole: bool,

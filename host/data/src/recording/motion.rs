@@ -11,7 +11,7 @@
 //! | `turning` | reversals, and the sample at which each begins |
 //! | `holding` | where the length is held |
 //! | `columns` | travel and time since a reversal, time at rest, cycles |
-//! | `state` | what each sample tells: held, in doubt, on a ramp |
+//! | `state` | what each sample shows: held, in doubt, on a ramp |
 //! | `rates` | speed, acceleration, pressure rate |
 //!
 //! The direction of friction is the sign of the speed while the muscle moves. While its length is held, it is the way the pressure

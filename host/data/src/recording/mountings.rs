@@ -8,7 +8,7 @@ pub const SAME_LENGTH: f64 = 0.5e-3;
 /// An unknown pause between two recordings of one mounting counts as this long, s: someone saves a file and starts the next. The
 /// memories of a muscle span decades of time, of which the recordings themselves are most.
 const ASSUMED_REST: f64 = 5.0;
-/// An unknown pause in which the muscle is mounted anew counts as this long, s. Between 300 and 1000 s the unseen error of eleven real
+/// An unknown pause in which the muscle is remounted counts as this long, s. Between 300 and 1000 s the unseen error of eleven real
 /// muscles changes by about a tenth at most (`trials festo-tables`); an endless pause is worse on most of them.
 const ASSUMED_REMOUNTING: f64 = 600.0;
 /// The time in which a muscle is vented after the last reading, s.

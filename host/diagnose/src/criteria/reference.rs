@@ -50,7 +50,7 @@ pam_data::criteria! {
     PAUSE: f64 = 12.0, "pause", "s", Judgement;
     /// Where the logarithmic clocks of creep begin.
     CREEP_START: f64 = 1.0, "creep_start", "s", Judgement;
-    /// A longer pause on a shared clock, and the actuator counts as mounted anew.
+    /// A longer pause on a shared clock, and the actuator counts as remounted.
     NEW_VISIT: f64 = 3600.0, "new_visit", "s", Judgement;
     /// First-order lags and delays that are tried on the rows of a run.
     LAGS: ([f64; 16]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0], "lags", "s", Judgement;
@@ -85,7 +85,7 @@ pam_data::criteria! {
     LOSS_ALIKE_SHARE: f64 = 0.8, "loss_alike_share", "1", Convention("as UPDATE_COVERED");
     /// Similar rests on both sides that a run must have.
     LOSS_RESTS: usize = 6, "loss_rests", "1", Judgement;
-    /// How often the weights of the rests are taken anew.
+    /// How often the weights of the rests are taken again.
     LOSS_REWEIGHTED: usize = 5, "loss_reweighted", "1", Cost;
     /// Slopes further than this many robust deviations from the line count less.
     LOSS_CLIP: f64 = 2.0, "loss_clip", "1", Convention("Huber, two standard deviations");
@@ -114,7 +114,7 @@ pam_data::criteria! {
         length: 0.277,
         directions: 0.566,
     }, "repeats", "1", Measured("restricted maximum likelihood on untouched runs of the development half, rounded; floors as said");
-    /// A mounting made anew by tape measure.
+    /// A remounting by tape measure.
     REMOUNT: f64 = 1e-3, "remount", "m", Convention("tape measure, 1 mm");
     /// Observations that the prior scale is worth.
     SCALE_PRIOR: f64 = 10.0, "scale_prior", "1", Judgement;
@@ -155,11 +155,11 @@ pam_data::criteria! {
     /// Prior probability that a change was there from the beginning of AFTER: four of five, as for no change at all. A step and a ramp
     /// within AFTER share the rest.
     COURSE_WHOLE: f64 = 0.8, "course_whole", "1", Judgement;
-    /// A change that began outside this part of AFTER has too little on one side to tell its course.
+    /// A change that began outside this part of AFTER has too little on one side to determine its course.
     COURSE_PART: ((f64, f64)) = (0.03, 0.97), "course_part", "1", Judgement;
     /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
     COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
-    /// Pairs of changes that are weighed in full where one name leaves something, the likeliest first.
+    /// Pairs of changes that are tested in full where one name leaves something, the likeliest first.
     PAIRS_TRIED: usize = 3, "pairs_tried", "1", Cost;
     /// Names in one answer, at most.
     MOST_CHANGES: usize = 3, "most_changes", "1", Cost;
@@ -174,7 +174,7 @@ pam_data::criteria! {
     /// Two recordings that share this part of the smaller one's rows in motion overlap: rows in motion agree by chance in far fewer.
     SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
     /// Recordings that reach over this share of the pressures and of the contractions that a table was tested at are a campaign: the table is
-    /// fitted anew to them.
+    /// fitted again to them.
     UPDATE_COVERED: f64 = 0.8, "update_covered", "1", Judgement;
     /// Pressures, or lengths, of such a campaign.
     UPDATE_LEVELS: usize = 3, "update_levels", "1", Derived("a curve over the pressure");
@@ -188,7 +188,7 @@ pam_data::criteria! {
     UNSEEN_LEAST: f64 = 0.1, "unseen_least", "1", Convention("as FURTHER_SHARE of the forward selection");
     /// The same from which on the names explain the difference; below it they explain a part.
     UNSEEN_EXPLAINED: f64 = 0.5, "unseen_explained", "1", Convention("the larger part");
-    /// The residual of the names, or a difference that mounting anew excuses, stands out above this many times what untouched recordings differ by.
+    /// The residual of the names, or a difference that remounting explains, stands out above this many times what untouched recordings differ by.
     STANDS_OUT: f64 = 2.0, "stands_out", "1", Convention("two standard deviations");
     /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
     LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;

@@ -90,7 +90,7 @@ fn columns(layer: &Layer<'_>, areas: &[f64], geometry: &Geometry, direction: &[f
     Some(Columns { base, laws })
 }
 
-/// Mean slope near the highest pressure. A mounting that hardly pulls tells none: then the least that a muscle has.
+/// Mean slope near the highest pressure. A mounting that hardly pulls gives none: then the least that a muscle has.
 pub(super) fn areas(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
     let points = layer.points;
     let slope = |m: usize| {

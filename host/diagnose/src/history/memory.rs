@@ -4,7 +4,7 @@
 //! dz_k/dt = (u − z_k)/τ_k        z̄ = (1/K) Σ z_k
 //! ```
 //! For a drive `u` that runs straight between two points the step is exact, whatever their distance:
-//! `z ← a z + α u_0 + β u_1`, `a = e^(−dt/τ)`, `β = 1 − τ(1 − a)/dt`, `α = (1 − a) − β`. The states start anew with each mounting.
+//! `z ← a z + α u_0 + β u_1`, `a = e^(−dt/τ)`, `β = 1 − τ(1 − a)/dt`, `α = (1 − a) − β`. The states restart with each mounting.
 
 use super::campaign::Points;
 use super::criteria::{VENT_TIME, VENTED_BEFORE};

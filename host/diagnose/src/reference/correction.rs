@@ -20,7 +20,7 @@ pub enum Done {
     Corrected,
     /// The table of before with the changes of the actuator: AFTER is no whole campaign.
     Updated,
-    /// The table is fitted anew to AFTER.
+    /// The table is fitted again to AFTER.
     Refitted,
 }
 
@@ -79,7 +79,7 @@ pub fn table(
         Verdict::Unexplained => {
             return refused(
                 "no table is written: something changed that has no name".into(),
-                "leave -o out, look at the report, and fit anew with `host fit` once the bench is in order",
+                "leave -o out, look at the report, and fit again with `host fit` once the bench is in order",
             );
         }
         Verdict::Explained | Verdict::PartlyExplained => {}
@@ -116,7 +116,7 @@ pub fn table(
                 format!(
                     "no table is written: a table has no place for `{effect}`, and AFTER is no whole campaign"
                 ),
-                "record a campaign like the one before, or fit anew with `host fit`",
+                "record a campaign like the one before, or fit again with `host fit`",
             );
         }
     };
@@ -126,7 +126,7 @@ pub fn table(
             format!(
                 "no table is written: with the change applied it would predict AFTER with an error of {with:.2} N, without it with {without:.2} N"
             ),
-            "record a campaign like the one before, or fit anew with `host fit`",
+            "record a campaign like the one before, or fit again with `host fit`",
         );
     }
     Ok((file, Done::Updated))

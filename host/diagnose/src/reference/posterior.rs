@@ -6,7 +6,7 @@ use super::contrast::log_sum;
 use super::criteria::{NAMED, PRIOR_UNKNOWN, SET};
 use super::shapes::{Change, Class};
 
-/// What is weighed.
+/// What is tested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Cause {
     None,

@@ -60,7 +60,7 @@ pub(super) struct Setting {
     pub range: f64,
     /// Largest force, N.
     pub largest: f64,
-    /// Whether AFTER was mounted anew.
+    /// Whether AFTER was remounted.
     pub remounted: bool,
     /// Whether the lengths are parts of one motion: then one mounting shifts them all.
     pub moving: bool,

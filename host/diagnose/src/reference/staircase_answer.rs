@@ -182,7 +182,7 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
     }
 }
 
-/// Names that these recordings cannot tell from a change. In motion the gauge's zero is always one of those of a gain or a zero: on
+/// Names that these recordings cannot distinguish from a change. In motion the gauge's zero is always one of those of a gain or a zero: on
 /// emulated muscles most of these zeros took such a name.
 fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
     let mut all: Vec<Change> = accepted.competitors.clone();

@@ -215,7 +215,7 @@ fn zero_over_time(course: impl Fn(f64) -> f64) -> ChangeReport {
 
 #[test]
 fn a_zero_that_steps_within_a_recording_is_named_as_a_zero() {
-    // Nine recordings of 60 s; the step is in the middle of the fifth. A step within the recordings is not weighed against a drift.
+    // Nine recordings of 60 s; the step is in the middle of the fifth. A step within the recordings is not compared with a drift.
     let report = zero_over_time(|t| f64::from(u8::from(t > 270.0)));
     let named = report.missing[0].effect.as_str();
     assert!(["force-offset", "force-drift"].contains(&named), "{:?}", report.probabilities);

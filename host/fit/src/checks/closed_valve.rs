@@ -17,7 +17,7 @@ use pam_data::recording::Quantity;
 
 /// Readings before a valve closes whose mean is the pressure at which it closed.
 const BEFORE: usize = 5;
-/// Pressure from which on closing a valve tells something, Pa.
+/// Pressure from which on closing a valve shows a leak, Pa.
 const PRESSED: f64 = 2e4;
 /// A loss is followed down to this share of the pressure at which the valve closed: below it, flow through a small leak is slower.
 const FOLLOWED: f64 = 0.5;

@@ -132,7 +132,7 @@ pub struct RowUse {
     pub clipped: usize,
     /// Rows whose force is outside the scatter of the others.
     pub outliers: usize,
-    /// Rows where a sensor failed, or something besides the muscle held a constant load; absent where there are none.
+    /// Rows where a sensor failed, or something other than the muscle held a constant load; absent where there are none.
     #[serde(skip_serializing_if = "is_zero")]
     pub dropouts: usize,
 }

@@ -66,8 +66,8 @@ pub fn remark(remark: &Remark) -> String {
             format!("the table is that of `{table}`, and `{muscle}` is described: is it the same actuator?")
         }
         Remark::OtherActuator => "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?".into(),
-        Remark::OneLengthMountedAnew => "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be distinguished from a change of gain; record at two lengths".into(),
-        Remark::WithinMounting => "the difference is larger than runs of one mounting differ by, and no larger than a mounting anew to a millimetre makes it, as recordings in different files count; if nothing was taken off the bench, add --same-mounting".into(),
+        Remark::OneLengthMountedAnew => "AFTER was remounted and has one length only: a shift of the clamp by a millimetre cannot be distinguished from a change of gain; record at two lengths".into(),
+        Remark::WithinMounting => "the difference is larger than runs of one mounting differ by, and no larger than remounting to a millimetre makes it, as recordings in different files count; if nothing was taken off the bench, add --same-mounting".into(),
         Remark::NothingTwice => "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured".into(),
         Remark::OneMounting { stroke, log } => format!(
             "the mounting at {:.1} mm differs alone (Bayes factor e^{log:.0}): clamped again, or slipped?",

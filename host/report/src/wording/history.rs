@@ -14,7 +14,7 @@ pub(crate) fn finding(of: &Finding) -> String {
         FindingDetail::Shift { lasts, shortened_mm } => shift(of, *lasts, *shortened_mm),
         FindingDetail::LoadedBefore => format!(
             "the muscle had been loaded for about {:.0} s before the first recorded run: a smaller first-run deficit is to be expected (chosen on a \
-             grid, weakly known)",
+             grid, uncertain)",
             of.size.value
         ),
         FindingDetail::SlackReading { grows } => slack_reading(of, *grows),

@@ -93,7 +93,7 @@ fn unjudgeable(reason: &Unjudgeable) -> String {
             format!("{usable} usable (direction known, muscle not slack); {least} are needed")
         }
         Unjudgeable::FewStrokes { found, least } => format!(
-            "only {} (from one reversal to the next; where the length is held, of the pressure); {least} are needed to tell an effect \
+            "only {} (from one reversal to the next; where the length is held, of the pressure); {least} are needed to distinguish an effect \
              from chance",
             pluralise(*found, "half-stroke")
         ),

@@ -144,7 +144,7 @@ pub struct Faults {
 
 fields!(Faults { latched, counts });
 
-/// Asks for one past fault: 0 the last, 1 the one before.
+/// Requests one past fault: 0 the last, 1 the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PastFault {
     /// How far back, less than [`FAULT_LOG`].

@@ -71,7 +71,7 @@ fn two(t: &mut String, trials: &[together::Trial]) {
     }
     let _ = writeln!(
         t,
-        "\nBeside a lag, the rows in motion are scored without what is named already, and the settled rows are weighed with the lag taken out at any \
+        "\nBeside a lag, the rows in motion are scored without what is named already, and the settled rows are tested with the lag taken out at any \
          size. Of two lags one is named. Two changes of opposite sign may nearly cancel: then nothing is named, and the set holds \"none\".\n\n\
          ### Pairs of two classes that were not both named, 3 %\n\n| pair | n | both exact | both in the set |\n| --- | --- | --- | --- |"
     );

@@ -341,7 +341,7 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
     }
 }
 
-/// The page with its sections on tables and on the cylinder written anew, and the lines on seals in the table of bounds.
+/// The page with its sections on tables and on the cylinder rewritten, and the lines on seals in the table of bounds.
 pub fn replaced(page: &str, against_tables: &[Trial], pairs: &[Pair]) -> String {
     let mut of_pairs = String::new();
     cylinder(&mut of_pairs, pairs);

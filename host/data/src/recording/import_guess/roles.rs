@@ -407,6 +407,6 @@ fn what_is_missing(sample: &Sample, guess: &mut Guess) {
         guess.unknown.push("no column of force: a fit and a diagnosis need it".into());
     }
     if !sample.whole {
-        guess.checks.push(format!("the first {} rows were looked at", sample.rows).into());
+        guess.checks.push(format!("the first {} rows were read", sample.rows).into());
     }
 }

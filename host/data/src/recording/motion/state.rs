@@ -1,4 +1,4 @@
-//! What each sample tells: whether the length is held, whether the direction is in doubt, whether the pressure ramps.
+//! What each sample shows: whether the length is held, whether the direction is in doubt, whether the pressure ramps.
 
 use std::ops::Range;
 

@@ -32,7 +32,7 @@ fn by_state(cells: &Cells, residual: &DVector<f64>) -> Vec<(Place, f64)> {
         .collect()
 }
 
-/// Correlation of neighbours along one coordinate; zero where there are too few to tell.
+/// Correlation of neighbours along one coordinate; zero where there are too few to decide.
 fn of_neighbours(states: &[(Place, f64)], coordinate: usize) -> f64 {
     let at: BTreeMap<Place, f64> = states.iter().copied().collect();
     let next = |place: &Place| {
