@@ -63,7 +63,7 @@ enum Notice {
     TraceFull,
 }
 
-/// The whole controller but for its board, its link and its store.
+/// The whole controller without its board, its link and its store.
 #[derive(Debug)]
 pub struct Controller {
     settings: Settings,

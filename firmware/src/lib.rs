@@ -26,7 +26,7 @@
 //! | log lines on their way to the host | `log` (feature of that name) |
 //! | all of it in a host's own process | `native` (feature of that name) |
 //!
-//! Nothing here knows a board, and nothing but `main` knows which board it is.
+//! Nothing here knows a board, and only `main` knows which board it is.
 
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 

@@ -178,7 +178,7 @@ pub struct Seen {
 }
 
 impl SideWatch {
-    /// Restarts, but for how long the muscle has been vented.
+    /// Restarts, except for how long the muscle has been vented.
     pub fn restart(&mut self) {
         *self = Self { vented_ticks: self.vented_ticks, ..Self::default() };
     }

@@ -39,10 +39,10 @@ pub struct Cli {
 /// What every sub-command does with its messages.
 #[derive(Debug, Clone, Args)]
 pub struct Output {
-    /// Say nothing but results and errors.
+    /// Print only results and errors.
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Messages")]
     quiet: bool,
-    /// Say more about what is done, and how long it took.
+    /// Print what is done, and how long it took.
     #[arg(short, long, global = true, help_heading = "Messages")]
     verbose: bool,
     /// Colours in messages: auto (on a terminal, and not where `NO_COLOR` is set), always or never.
@@ -190,7 +190,7 @@ fn parse() -> Result<Cli> {
 
 /// Prints help or the version, or what is wrong with a call, and ends: with status 2 for the last.
 ///
-/// A reader that stopped reading (`| head`) is no failure; a full disk is, and comes back as an error.
+/// A reader that stopped reading (`| head`) is not a failure; a full disk is, and comes back as an error.
 fn ended(words: &clap::Error) -> Error {
     // A name that a shell has put in the place of `*` may hold anything.
     let plain = words.render().to_string();

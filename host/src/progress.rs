@@ -15,7 +15,7 @@ const REDRAW: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_millis(400);
 /// Width of the bar where the terminal has room for it, characters.
 const BAR: usize = 24;
-/// A bar narrower than this says nothing.
+/// A bar narrower than this shows nothing.
 const LEAST_BAR: usize = 6;
 /// Width of a terminal that does not say its own.
 const COLUMNS: usize = 80;
@@ -55,7 +55,7 @@ impl ProgressLine {
         Self::begin(what.into(), console.live())
     }
 
-    /// One that says nothing, for libraries and tests.
+    /// One that prints nothing, for libraries and tests.
     #[must_use]
     pub fn silent() -> Self {
         Self::begin(String::new(), false)

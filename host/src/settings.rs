@@ -105,7 +105,7 @@ pub fn files() -> Result<Vec<PathBuf>> {
 /// Reads the settings of a file for a command line.
 ///
 /// # Errors
-/// [`DataCode::FileUnreadable`]; [`HostCode::SettingsInvalid`] with the line for text that is no TOML, an option that no command has, a
+/// [`DataCode::FileUnreadable`]; [`HostCode::SettingsInvalid`] with the line for text that is not TOML, an option that no command has, a
 /// value that it cannot take.
 pub fn read(file: &Path, command: &Command) -> Result<Vec<Setting>> {
     let text = bounds::read_text(file, bounds::WRITTEN)?.map_err(|()| {
@@ -230,7 +230,7 @@ impl Reading<'_> {
             }
             _ => {
                 return Err(self
-                    .wrong(at, key, "a date or a table is no value of an option")
+                    .wrong(at, key, "a date or a table is not a value of an option")
                     .help("write a text, a number, true or a list"));
             }
         })

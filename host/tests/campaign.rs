@@ -70,7 +70,7 @@ fn a_killed_campaign_loses_no_row_and_goes_on() {
     // Ctrl-C.
     let id = rustix::process::Pid::from_child(&child);
     rustix::process::kill_process(id, rustix::process::Signal::INT).unwrap();
-    assert!(child.wait().unwrap().success(), "an interruption is no failure");
+    assert!(child.wait().unwrap().success(), "an interruption is not a failure");
     let after = rows(folder);
     assert!(before.iter().all(|row| after.contains(row)), "a row is gone");
     let course: Value =

@@ -37,7 +37,7 @@ PATIENCE_S = 60
 BUILD_PATIENCE_S = 600
 # Parts of the names of tests that take seconds, by their module. They run last, on changes of their module that the others do not notice.
 LATE = {"health": ["correlated_noise"], "watch": ["watch::tests::calm"], "store": ["loses_power", "lose_power"]}
-# What is no code: comments, strings, characters (but no lifetimes).
+# What is not code: comments, strings, characters (but no lifetimes).
 NO_CODE = re.compile(r"//[^\n]*|/\*.*?\*/|r(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\[^\n]*?|[^'\\\n])'", re.DOTALL)
 INLINE = re.compile(r"#\[inline(\((always|never)\))?\]")
 

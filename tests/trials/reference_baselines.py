@@ -112,7 +112,7 @@ def lisdd(pair, level, significance):
     other; certify: F-test on the half that did not choose the term."""
     one, two = pair.split
     places = regions(pair)
-    # The clean regime: where the difference is no larger than the spread. A shift common to it is no discrepancy of the others.
+    # The clean regime: where the difference is no larger than the spread. A shift common to it is not a discrepancy of the others.
     clean = [i for i in places.values() if np.mean(one[i] ** 2) < scipy.stats.chi2.ppf(level, len(i)) / len(i)]
     flagged = [i for i in places.values() if not np.mean(one[i] ** 2) < scipy.stats.chi2.ppf(level, len(i)) / len(i)]
     if not flagged:

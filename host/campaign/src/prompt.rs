@@ -25,7 +25,7 @@ impl<W> std::fmt::Debug for Prompt<W> {
     }
 }
 
-/// Time between two checks of Ctrl-C while the operator is awaited.
+/// Time between two checks of Ctrl-C while the program waits for the operator.
 const LOOK: Duration = Duration::from_millis(50);
 /// Strokes closer than this are the same, m: a hundredth of a millimetre is finer than an operator sets one.
 const SAME: f64 = 1e-5;

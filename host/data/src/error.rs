@@ -402,7 +402,7 @@ impl miette::Diagnostic for Error {
 /// assert_eq!(pam_data::error::nearest("fti", ["run", "fit"]), Some("fit"));
 /// ```
 pub fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // Names are short; anything longer is no misspelling of one of ours.
+    // Names are short; anything longer is not a misspelling of one of ours.
     let wanted = wanted.chars().take(64).collect::<String>().to_lowercase();
     candidates
         .into_iter()

@@ -227,7 +227,7 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
         "{:?}",
         guess.checks
     );
-    // One file at one pressure says nothing of either.
+    // One file at one pressure shows neither.
     let (_, recordings) = read(&[("a.csv", file(200.0))]);
     assert_eq!((recordings.unwrap()[0].pressure[0] * 1e-3).round(), 700.0);
 }

@@ -95,7 +95,7 @@ fn a_held_length_is_taken_from_the_names_of_the_files() {
     ]);
     assert!(guess.unknown.is_empty(), "{:?}", guess.unknown);
     assert_eq!(strokes_mm(&recordings), [18.0, 40.5, 25.5], "{}", guess.description);
-    // A diameter alone is no length.
+    // A diameter alone is not a length.
     let unknown = |names: [&str; 2]| {
         let folder = tempfile::tempdir().unwrap();
         let paths = names.map(|name| folder.path().join(name));

@@ -44,7 +44,7 @@ pub enum Address {
     },
 }
 
-/// Where nothing else is said: the bit rate of a new device, and a speed that most adapters have that are not on USB.
+/// The default: the bit rate of a new device, and a speed that most adapters have that are not on USB.
 const KBIT_PER_S: u16 = CanLine::OFF.kbit_per_s;
 const BAUD: u32 = 115_200;
 

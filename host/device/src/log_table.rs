@@ -83,7 +83,7 @@ impl LogTable {
     /// Reads an image's log lines.
     ///
     /// # Errors
-    /// [`DataCode::FileUnreadable`] for a file that is no image, or one without logs.
+    /// [`DataCode::FileUnreadable`] for a file that is not an image, or one without logs.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = pam_data::bounds::read(path, pam_data::bounds::WHOLE)?;
         Self::parse(&bytes).map_err(|why| {
@@ -105,7 +105,7 @@ impl LogTable {
     /// The log lines of an image.
     ///
     /// # Errors
-    /// Why the bytes are no image, or one without logs.
+    /// Why the bytes are not an image, or one without logs.
     pub fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
         let elf = object::File::parse(bytes).map_err(|e| format!("this is no ELF image: {e}"))?;
         let section = elf.section_by_name(".defmt").ok_or("the image was built without logs")?.index();

@@ -21,7 +21,7 @@ const REFUSED: u8 = 7;
 const LONGEST: usize = 160;
 /// Digits of a received message's time.
 const TIME: usize = 4;
-/// How lines begin that an adapter may send and that say nothing here.
+/// How lines begin that an adapter may send and that have no meaning here.
 const PASSED_OVER: &[u8] = b"TrRdDbBFVvNnZzALE";
 
 /// What an adapter has said.
@@ -33,7 +33,7 @@ pub enum Received {
     Done,
     /// The last line is refused.
     Refused,
-    /// Something that says nothing here.
+    /// Something without a meaning here.
     PassedOver,
     /// Nothing that an adapter says.
     Foreign,

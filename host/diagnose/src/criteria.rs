@@ -1,6 +1,6 @@
 //! Every number that decides, on one page: symbol, unit, value, statistical meaning, source.
 //!
-//! One file per stage of the diagnosis. Guards against division by zero and steps of numerical derivatives are no criteria; they stand
+//! One file per stage of the diagnosis. Guards against division by zero and steps of numerical derivatives are not criteria; they stand
 //! where they are used. Two ideas of inexactness meet here with several values, on purpose:
 //!
 //! | criterion | inexactness of | as a share of |

@@ -91,7 +91,7 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
     for i in 0..rows.len() {
         let c = rows.contexts()[i];
         if rows.root_weight()[i] > 0.0 && !rows.vented[i] && (c.speed != 0.0 || rows.isometric) {
-            // Repeats at another speed are no repeats.
+            // Repeats at another speed are not repeats.
             // (At held length the place on the staircase takes the speed's part, and the run the cycle's.)
             let speed = if rows.isometric {
                 (c.pressure / top * REPEAT_PRESSURE_BINS).round() as i32

@@ -2,7 +2,7 @@
 //!
 //! Between two recordings the muscle is vented in [`VENTING`] seconds, rests without pressure, and is filled from there to the first
 //! reading. Where it was remounted in between, it may have carried a load without a recording ([`EarlierLoad`]). Recordings
-//! in motion say nothing about the time between them.
+//! in motion do not show the time between them.
 
 use model_core::effects::{Context, EffectName, FittedEffect};
 use model_core::motion::Motion;

@@ -223,7 +223,7 @@ impl Shared<'_> {
 
     fn reused(&self, muscle: &str) {
         let failed = self.output.has_failures(muscle);
-        // What needs no computing says nothing about the remaining time.
+        // What needs no computing does not show the remaining time.
         let total = self.total.fetch_sub(1, Ordering::Relaxed) - 1;
         self.progress.total(total);
         let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);

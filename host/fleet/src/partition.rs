@@ -26,7 +26,7 @@ pub const TABLES: [&str; 4] = ["fits", "tables", "diagnoses", "failures"];
 const PARTIAL: &str = ".partial";
 const PREFIX: &str = "muscle=";
 
-/// The name of a muscle's folder, as engines decode it: what is no letter, digit, `-`, `_` or `.` is percent-encoded.
+/// The name of a muscle's folder, as engines decode it: what is not a letter, digit, `-`, `_` or `.` is percent-encoded.
 ///
 /// ```
 /// assert_eq!(pam_fleet::partition::folder_name("mini 1/a"), "muscle=mini%201%2Fa");

@@ -55,7 +55,7 @@ impl Table {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// With one more row, whose name leads to another file; an empty address is no link.
+    /// With one more row, whose name leads to another file; an empty address is not a link.
     pub fn linked_row(
         &mut self,
         address: impl Into<String>,

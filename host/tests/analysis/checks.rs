@@ -135,7 +135,7 @@ fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     let gain = &answer.missing[0];
     assert!(gain.checked && gain.correction && gain.confusable_with.is_empty());
     assert!((gain.parameters[0].value - 0.04).abs() < 2e-3, "{:?}", gain.why);
-    // What the checks cleared is said to be clear, with a bound.
+    // What the checks cleared is reported as clear, with a bound.
     let cleared = answer.considered.iter().find(|c| c.effect == "gauge-gain").expect("looked at");
     let why_not = pam_report::wording::why_not(cleared);
     assert!(why_not.contains("a reference gauge"), "{why_not}");

@@ -1,6 +1,6 @@
 //! Recordings of a kind that a tidy campaign does not have: the fit gives the truth, or gives the reason why not.
 //!
-//! The truth is the thesis's own model (shared/model.md), written out here once more, so that nothing but the recording is odd.
+//! The truth is the thesis's own model (shared/model.md), written out here once more, so that only the recording is odd.
 
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
@@ -215,7 +215,7 @@ fn a_mounting_whose_length_is_read_anew_in_each_run_is_one_length() {
     assert!((predicted - truth).abs() < 0.03 * blocked, "{predicted} N, {truth} N, blocked {blocked} N");
 }
 
-/// Readings in another unit, and readings of a loose plug, change nothing but their own rows: in the table, in what it predicts, and in
+/// Readings in another unit, and readings of a loose plug, change only their own rows: in the table, in what it predicts, and in
 /// the answer of a diagnosis.
 #[test]
 fn a_gauge_that_falls_out_does_no_harm() {
@@ -367,7 +367,7 @@ fn a_prediction_of_a_recording_with_decimal_commas_can_be_read_again() {
 }
 
 /// The rig pushes the muscle against its contraction stop. Polynomials that followed the wall would be wrong where the muscle pulls; and
-/// the wall is no noise, so that a diagnosis names it.
+/// the wall is not noise, so that a diagnosis names it.
 #[test]
 fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_does_not_bend_the_table() {
     let mut noise = Noise::new(8, 0.0);

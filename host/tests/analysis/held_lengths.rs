@@ -49,7 +49,7 @@ fn described_dimensions_stay_where_others_describe_the_force_no_better() {
     let text = fitted.summary.to_string() + &fitted.summary.warnings.join("\n");
     assert!(text.contains("held lengths (3 mountings)"), "{text}");
     for advice in ["longer stroke", "slow stroke"] {
-        assert!(!text.contains(advice), "{advice:?} is no advice for held lengths: {text}");
+        assert!(!text.contains(advice), "{advice:?} is not advice for held lengths: {text}");
     }
 }
 

@@ -246,7 +246,7 @@ fn a_length_that_was_not_recorded_is_predicted_from_the_others() {
     }
 }
 
-/// A run whose force is in another unit, and spikes of the pressure, are no reason to see no memory in the others, and none of these readings
+/// A run whose force is in another unit, and spikes of the pressure, are not a reason to see no memory in the others, and none of these readings
 /// is taken for an error.
 #[test]
 fn failing_sensors_leave_the_memory_of_the_other_readings() {

@@ -165,7 +165,7 @@ impl Traits {
     pub const fn made_from_base(self) -> Self {
         Self { made_from_base: true, ..self }
     }
-    /// The same, mistaken for something that is no effect.
+    /// The same, mistaken for something that is not an effect.
     #[must_use]
     pub const fn imitates(self, what: Imitates) -> Self {
         Self { imitates: Some(what), ..self }

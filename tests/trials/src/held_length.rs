@@ -99,7 +99,7 @@ enum Said {
     CouldHide,
     /// Something is unexplained, and nothing is named.
     Unexplained,
-    /// Nothing is named, and the effect is said to be smaller than it is.
+    /// Nothing is named, and the effect is reported as smaller than it is.
     Denied,
     /// Another effect is named.
     Wrong,

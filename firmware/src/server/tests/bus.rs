@@ -81,7 +81,7 @@ impl Bus {
         }
     }
 
-    /// Every device sees every message; gives what they send, but for the message of this number.
+    /// Every device sees every message; gives what they send, except the message of this number.
     fn carry(&mut self, sent: &[Message], lost: Option<usize>) -> Vec<Message> {
         let mut answers = Vec::new();
         for message in sent {

@@ -88,7 +88,7 @@ fn a_change_as_large_as_the_bound_is_no_jump() {
         |change: f32| (0..40).map(move |tick| still(200e3, 0.0, if tick % 2 == 0 { 0.0 } else { change }));
     assert_eq!(all(alternating(100.0), &settings), []);
     let (tick, finding) = all(alternating(100.5), &settings)[0];
-    // The first reading is no jump.
+    // The first reading is not a jump.
     assert_eq!(
         (tick, finding.fault, finding.limit),
         (u32::from(settings.watch.noisy_jumps) + 1, Fault::SensorNoisy, 100.0)

@@ -20,7 +20,7 @@ const UTF_16_BIG: [u8; 2] = [0xfe, 0xff];
 /// An open file, read from its beginning.
 pub(super) struct Source {
     pub reader: Box<dyn Read + Send>,
-    /// Size of the text if it is known beforehand, bytes.
+    /// Size of the text if it is known in advance, bytes.
     pub size: Option<u64>,
     /// The first bytes of the file itself, before any decompression.
     pub magic: Vec<u8>,
@@ -108,7 +108,7 @@ impl Read for Bytes {
     }
 }
 
-/// UTF-16 as UTF-8, as it is read. What is no character becomes the sign for that.
+/// UTF-16 as UTF-8, as it is read. What is not a character becomes the sign for that.
 struct Utf16 {
     units: Box<dyn Read + Send>,
     big_endian: bool,

@@ -139,7 +139,7 @@ pam_data::criteria! {
     PLACES_CONCENTRATED: f64 = 1.5, "places_concentrated", "1", Judgement;
     /// And when chance gives as much no more often than this.
     PLACES_SURE: f64 = 0.05, "places_sure", "1", Judgement;
-    /// Slopes below this say nothing about a shift, as a share of the largest.
+    /// Slopes below this do not show a shift, as a share of the largest.
     RUN_OFFSET_FLAT: f64 = 0.03, "run_offset_flat", "1", Judgement;
     /// Fewest points from which an offset is taken.
     RUN_OFFSET_LEAST: usize = 5, "run_offset_least", "1", Judgement;

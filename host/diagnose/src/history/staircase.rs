@@ -20,8 +20,8 @@ pub(super) struct Point {
     pub force: f64,
     /// 1 filling, −1 emptying.
     pub direction: i8,
-    /// The direction of friction that follows the pressure as it was read, over each of [`FOLLOWED_OVER`]: what a pulse overshoots by turns
-    /// it back.
+    /// The direction of friction that follows the pressure as it was read, over each of [`FOLLOWED_OVER`]: the overshoot of a pulse
+    /// reverses it.
     pub followed: [f64; FOLLOWED_OVER.len()],
     /// The pressure behind a filter of first order with each of [`FILTER_TIMES`], less the pressure, Pa.
     pub filtered: [f64; FILTER_TIMES.len()],

@@ -238,7 +238,7 @@ impl<'a> Prepared<'a> {
         Ok(columns)
     }
 
-    /// A table without the history of its fit, but for the earlier load.
+    /// A table without the history of its fit, except the earlier load.
     fn bare(&self, table: MuscleTable, assumed: Assumed) -> TableFile {
         TableFile { table, about: About { earlier_load: assumed.earlier_load, ..About::default() } }
     }

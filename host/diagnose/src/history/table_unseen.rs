@@ -34,7 +34,7 @@ pub struct UnseenErrors {
     /// Contact and memory.
     pub with_memory: UnseenError,
     /// The same with the length of each left-out mounting, within `LENGTH_ERROR` of the one that was set, that suits its own readings
-    /// best. This is no prediction: it shows how much of the error comes from the lengths. As `with_memory` where runs are left out.
+    /// best. This is not a prediction: it shows how much of the error comes from the lengths. As `with_memory` where runs are left out.
     pub with_own_length: UnseenError,
     /// The errors without memory of the readings whose pressure another run of the mounting reaches.
     pub supported_without_memory: UnseenError,

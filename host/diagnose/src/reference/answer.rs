@@ -50,9 +50,9 @@ pub enum NotComparable {
         /// Pa.
         pressure: f64,
     },
-    /// Changes that strokes at regulated pressures are not asked about.
+    /// Changes that strokes at regulated pressures are not tested for.
     Strokes,
-    /// Changes that a motion of length and pressure together is not asked about.
+    /// Changes that a motion of length and pressure together is not tested for.
     Moving,
     /// Parts of strokes at levels, places or speeds that the reference does not have.
     States {
@@ -279,7 +279,7 @@ pub struct HeldOut {
     /// rms with them, N.
     pub rms_after_N: f64,
     /// Share of the difference's energy that they remove from the held-out recordings in which they show: a change that begins within
-    /// AFTER says nothing of those before it.
+    /// AFTER does not show in those before it.
     pub share_where_shown: f64,
     /// What repeats, N.
     pub noise_N: f64,

@@ -18,7 +18,7 @@ pub enum Done {
     Unchanged,
     /// The bench's correction is beside the table of before.
     Corrected,
-    /// The table of before with the changes of the actuator: AFTER is no whole campaign.
+    /// The table of before with the changes of the actuator: AFTER is not a whole campaign.
     Updated,
     /// The table is fitted again to AFTER.
     Refitted,
@@ -57,7 +57,7 @@ fn correction(changed: &Changed) -> Option<Correction> {
         | Change::DisplacementOffset
         | Change::SensorDelay
         | Change::PressureSensorLag => parameters[0] = size,
-        // A drift over one campaign says nothing of the next, and a frame's law has a part at turns that was not measured.
+        // A drift over one campaign does not show that of the next, and a frame's law has a part at turns that was not measured.
         _ => return None,
     }
     Some(Correction { effect: changed.effect.clone(), parameters })
@@ -114,7 +114,7 @@ pub fn table(
         Err(effect) => {
             return refused(
                 format!(
-                    "no table is written: a table has no place for `{effect}`, and AFTER is no whole campaign"
+                    "no table is written: a table has no place for `{effect}`, and AFTER is not a whole campaign"
                 ),
                 "record a campaign like the one before, or fit again with `host fit`",
             );

@@ -56,7 +56,7 @@ pub(super) struct Reference {
 /// Recordings that leave no common cells, or numbers that cannot be used.
 pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
     let Reference { surface, error, recorded } = reference;
-    // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    // Rows of one part of a motion do not follow one another: they do not show lags.
     // A table is often older: a filter of some seconds may have been added since.
     let tried = if recorded { LAGS_FIRST } else { LAGS.len() };
     let shift = (!runs.moving).then(|| lag::between(&runs, &surface, tried, false));

@@ -6,7 +6,7 @@ use super::cells::Cell;
 use super::criteria::{REMOUNT, REPEATABILITY_PULLS, REPEATS};
 
 /// What repeats: standard deviations in per cent of the largest force, learned by restricted maximum likelihood on untouched runs of the
-/// development half and rounded; floors as said.
+/// development half and rounded; floors as stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Repeats {
     /// Slope per unit ln(time since mounting), own to a mounting.

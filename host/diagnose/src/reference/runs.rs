@@ -120,7 +120,7 @@ pub(super) fn mounted_anew(before: &Campaign, after: &Campaign, said: Mounted) -
                 .fold(f64::NEG_INFINITY, |a, b| a.max(*b));
             let begin =
                 after.recordings.iter().filter_map(|r| r.time.first()).fold(f64::INFINITY, |a, b| a.min(*b));
-            // A clock that shows less than before, or about zero, was restarted and says nothing.
+            // A clock that shows less than before, or about zero, was restarted and does not show it.
             let one_clock = before.clock == Clock::Shared && begin > end && begin - end < NEW_VISIT;
             !(one_file || one_clock)
         }

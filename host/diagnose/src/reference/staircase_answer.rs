@@ -112,7 +112,7 @@ fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
         remarks.push(Remark::GaugeOfMotion);
     }
     if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
-        // With a change that all mountings show, the one that shows it most is no news.
+        // With a change that all mountings show, the one that shows it most is not new.
         if !analysis.runs.moving && matches!(verdict, Verdict::Consistent | Verdict::Unexplained) {
             remarks.push(Remark::OneMounting { stroke: analysis.runs.strokes[mounting], log });
         }

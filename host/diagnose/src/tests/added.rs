@@ -1,5 +1,5 @@
 //! Adding an effect takes its file and one line of a list: here both are outside the catalogue, and the diagnosis finds the effect,
-//! fits its shape and says what would show it, from nothing but that file.
+//! fits its shape and says what would show it, from that file alone.
 
 mod stroke_ripple;
 

@@ -1,6 +1,6 @@
 //! How uncertain the parameters are: a jackknife over blocks of the motion.
 //!
-//! Residuals are correlated in time (noise that is coloured, misfit that lasts), so single rows are no independent witnesses.
+//! Residuals are correlated in time (noise that is coloured, misfit that lasts), so single rows are not independent witnesses.
 //! Blocks are stretches of a half-stroke several autocorrelation times long. Each is left out in turn; around the
 //! solution that is a subtraction from the normal equations:
 //!

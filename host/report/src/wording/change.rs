@@ -274,7 +274,7 @@ fn usual_unit(value: f64, unit: &str) -> (f64, String) {
     (factor, format!(" {name}"))
 }
 
-/// Numbers without a unit that are no shares.
+/// Numbers without a unit that are not shares.
 const COUNTS: [&str; 4] = ["exponent", "order", "onset", "width"];
 
 /// A size with its interval in a unit that people use.

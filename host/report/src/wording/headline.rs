@@ -2,7 +2,7 @@
 
 use pam_diagnose::reference::{ChangeReport, Verdict};
 
-/// "Nothing changed" is said with its probability where the recordings make it less probable than it counts before them.
+/// "Nothing changed" is stated with its probability where the recordings make it less probable than it counts before them.
 const DOUBTFUL: f64 = 0.8;
 
 /// The sentence that stands first.

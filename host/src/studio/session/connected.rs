@@ -318,7 +318,7 @@ impl Connected {
                 let cleared = self.client.call_once::<ClearFault>(&());
                 self.status = self.client.call::<GetStatus>(&())?;
                 self.note_fault()?;
-                // The purpose is that none is latched: one that is gone already is no failure.
+                // The purpose is that none is latched: one that is gone already is not a failure.
                 if self.status.state == State::Fault {
                     cleared?;
                 }

@@ -10,7 +10,7 @@ use crate::fields::{codes, fields};
 pub const FAULT_LOG: usize = 8;
 
 codes! {
-    /// States of safety. Nothing but a host's request leads towards `Running`, and no fault is left without one.
+    /// States of safety. Only a request of a host leads towards `Running`, and no fault is left without one.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum State {
         /// After every start: vented, answers questions.

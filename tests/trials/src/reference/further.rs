@@ -32,7 +32,7 @@ pub struct Further {
 }
 
 /// How far these trials are a test.
-const DEVELOPED: &str = "\nThese are no independent test: the courses, the pairs and the lags beside other changes were developed on six of the muscles. \
+const DEVELOPED: &str = "\nThese are not an independent test: the courses, the pairs and the lags beside other changes were developed on six of the muscles. \
          Two constants were chosen by results of all of them: `named_shape_error` (0.1 instead of 0.05) and the longest lag that is tried.\n";
 
 fn rate<T>(of: &[&T], right: impl Fn(&T) -> bool) -> Rate {

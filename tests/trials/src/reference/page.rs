@@ -140,7 +140,7 @@ fn injected(text: &mut String, trials: &[Trial]) {
     }
 }
 
-/// Bounds that were set beforehand, and what was measured on all eleven muscles.
+/// Bounds that were set in advance, and what was measured on all eleven muscles.
 fn bounds(text: &mut String, trials: &[Trial], pairs: &[Pair], speed: Option<(usize, f64)>) {
     let at_three: Vec<&Trial> = trials.iter().filter(|t| t.effect.is_some() && t.percent == 3.0).collect();
     let n = at_three.len();

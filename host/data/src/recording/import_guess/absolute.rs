@@ -13,7 +13,7 @@ const VENTED: (f64, f64) = (83e3, 107e3);
 const AT_START: usize = 20;
 /// The muscle is slack where its force is below this share of the largest.
 const SLACK: f64 = 0.03;
-/// Where the highest pressure is this many times the lowest, the lowest is no tested level.
+/// Where the highest pressure is this many times the lowest, the lowest is not a tested level.
 const FAR_ABOVE: f64 = 2.0;
 
 /// Adds the question if the pressure is absolute where its lowest readings are those of the atmosphere, and the muscle is slack there at the

@@ -7,7 +7,7 @@ use super::{Guess, GuessedColumn, Note, Source, roles};
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 
-/// Columns that are named for a quantity and hold cells that are no numbers.
+/// Columns that are named for a quantity and hold cells that are not numbers.
 pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
     for column in &sample.columns {
         let Some(quantity) = column.named_for() else { continue };
@@ -23,7 +23,7 @@ pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
             "remove these cells, or write all decimals with the same sign"
         };
         let text = format!(
-            "{} looks like {}, but {} of {} cells are no numbers, such as `{}`: {advice}",
+            "{} looks like {}, but {} of {} cells are not numbers, such as `{}`: {advice}",
             column.header,
             quantity.name().replace('_', " "),
             column.texts,

@@ -133,7 +133,7 @@ fn best(
     Some(first)
 }
 
-/// Whether all files hold the same value in this column, but for noise.
+/// Whether all files hold the same value in this column, except for noise.
 fn is_steady(column: &SampleColumn, others: &Others<'_>) -> bool {
     /// Share of the largest value: a regulator holds its supply within some per cent, and levels of a campaign differ by more.
     const SAME: f64 = 0.05;

@@ -123,7 +123,7 @@ impl SampleColumn {
     }
 
     /// Whether the numbers reach further below zero than above it, without the farthest twentieth on each side: codes for missing readings,
-    /// such as −999, are no readings.
+    /// such as −999, are not readings.
     pub(super) fn is_mostly_negative(&self) -> bool {
         let mut values: Vec<f64> = self.values().collect();
         !values.is_empty() && -quantile(&mut values, 0.05) > quantile(&mut values, 0.95)

@@ -1,4 +1,4 @@
-//! Motions whose directions are known, with noise: what is found must be the truth but for samples that noise hides.
+//! Motions whose directions are known, with noise: what is found must be the truth except for samples that noise hides.
 
 use proptest::prelude::*;
 

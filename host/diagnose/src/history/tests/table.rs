@@ -74,7 +74,7 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     assert_eq!(settled.with_memory, recorded.with_memory);
 }
 
-/// A mounting that is 0.4 mm from where it is said to be: with the length that suits its readings most of its error is gone.
+/// A mounting that is 0.4 mm from its stated place: with the length that suits its readings most of its error is gone.
 #[test]
 fn what_a_wrong_length_adds_to_the_error_of_an_unseen_mounting_is_distinguished() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
