@@ -107,7 +107,7 @@ impl LogTable {
     /// # Errors
     /// Why the bytes are not an image, or one without logs.
     pub fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let elf = object::File::parse(bytes).map_err(|e| format!("this is no ELF image: {e}"))?;
+        let elf = object::File::parse(bytes).map_err(|e| format!("this is not an ELF image: {e}"))?;
         let section = elf.section_by_name(".defmt").ok_or("the image was built without logs")?.index();
         let (mut entries, mut timestamp) = (BTreeMap::new(), None);
         for symbol in elf.symbols() {
@@ -284,6 +284,6 @@ mod tests {
         }
         frame.push(0);
         assert!(table().decode(&frame).is_err(), "bytes too many");
-        assert!(LogTable::parse(b"no image").unwrap_err().contains("no ELF"));
+        assert!(LogTable::parse(b"no image").unwrap_err().contains("not an ELF"));
     }
 }

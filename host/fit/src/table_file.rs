@@ -249,7 +249,7 @@ impl About {
             .earlier_load
             .is_some_and(|l| [l.pressure, l.seconds].iter().any(|x| !(*x >= 0.0 && x.is_finite())))
         {
-            return wrong("an earlier load that is no pressure and time");
+            return wrong("an earlier load that is not a pressure and a time");
         }
         if let Some(u) = &self.uncertainty {
             let expected = (u.rows as usize).checked_mul(u.columns as usize);
