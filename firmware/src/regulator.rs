@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_empty_stays_so_when_it_is_vented() {
+    fn an_empty_regulator_stays_empty_when_vented() {
         for (offset_pa, pressure_pa, empty) in
             [(0.0, 0.0, true), (-4e3, 0.0, true), (4e3, 0.0, false), (0.0, 1.0, false)]
         {

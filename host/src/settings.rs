@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_reported_with_its_line_and_a_remedy() {
+    fn faults_are_reported_with_their_line_and_a_remedy() {
         for (text, line, said) in [
             ("\nprot = 1\n", 2, "did you mean port"),
             ("[fit]\norder = 9\n", 2, "9 is not in 1..=6"),

@@ -123,7 +123,7 @@ fn runs_in_one_file_are_set_apart_where_time_begins_again() {
 }
 
 #[test]
-fn what_cannot_be_known_is_left_out_and_listed() {
+fn unknown_columns_are_left_out_and_listed() {
     let text = format!(
         "time_s,pressure_kPa,stroke_mm,load [V]\n{}",
         rows(|[t, p, x, f]| format!("{t},{},{x},{}", 100.0 * p, f / 50.0))

@@ -233,7 +233,7 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
 }
 
 #[test]
-fn what_a_file_lacks_is_reported_with_the_right_remedy() {
+fn missing_data_are_reported_with_the_right_remedy() {
     let unknown = |text: String| read(&[("a_300kPa.csv", text.into())]).0.all_unknown();
     let head = "time_s,pressure_kPa,displacement_mm,force_N\n";
     // Two sensors in rows of their own: leaving out incomplete rows leaves none.

@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_printed_is_read_again() {
+    fn printed_addresses_are_read_again() {
         for text in [
             "/dev/ttyUSB0",
             "COM3",

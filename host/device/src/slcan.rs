@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_adapter_says_besides_is_distinguished() {
+    fn other_lines_of_an_adapter_are_distinguished() {
         let said = all(b"\rz\r\x07V1013\rT000000801AA\rt10\x07t2011FF\n\r");
         let message = Received::Message(0x201, vec![0xFF]);
         assert_eq!(

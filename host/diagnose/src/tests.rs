@@ -309,7 +309,7 @@ fn viscous_damping_is_found_with_its_size() {
 }
 
 #[test]
-fn what_is_given_is_fitted_and_judged_by_the_recordings() {
+fn given_effects_are_fitted_and_judged_by_the_recordings() {
     let rubbed = recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign);
     // What is there is found with its size whatever else was tested …
     let d = diagnosed_with(&rubbed, &["coulomb-friction"]).expect("an answer");
@@ -337,7 +337,7 @@ fn what_is_given_is_fitted_and_judged_by_the_recordings() {
 }
 
 #[test]
-fn what_the_base_holds_already_cannot_be_given() {
+fn effects_of_the_base_model_cannot_be_given() {
     let campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
     let refused = |given: &[&str]| diagnosed_with(&campaign, given).expect_err("refused").to_string();
     assert!(refused(&["gauge-offset"]).contains("deadband"));
@@ -397,7 +397,7 @@ fn bad_input_is_answered_in_words() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_said() {
+fn limits_of_the_judgement_are_reported() {
     let whole = recorded(loops(&[0.2]), 7, coloured(0.1, 2.0), |_, _, _| 0.0);
     let one_pressure = Campaign::new(vec![whole.recordings[2].clone()]);
     let mut short = one_pressure.clone();

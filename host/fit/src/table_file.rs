@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read() {
+    fn a_written_table_is_read_back() {
         let bytes = example().to_bytes().expect("valid");
         assert_eq!(TableFile::from_bytes(&bytes).expect("valid"), example());
     }

@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_interrupted_run_left_goes_and_a_living_run_keeps_its_place() {
+    fn remains_of_an_interrupted_run_are_removed_and_a_running_one_is_kept() {
         let root = tempfile::tempdir().expect("a folder");
         let dead = root.path().join(PARTIAL).join("run-dead");
         fs::create_dir_all(dead.join("muscle=a")).expect("made");

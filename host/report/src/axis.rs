@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_counted_has_whole_ticks() {
+    fn counts_have_whole_ticks() {
         assert_eq!(texts(&whole_ticks(0.92, 3.08, 5)), ["1", "2", "3"]);
         assert_eq!(texts(&whole_ticks(0.7, 8.3, 4)), ["2", "4", "6", "8"]);
         assert_eq!(texts(&whole_ticks(0.95, 1.05, 4)), ["1"]);

@@ -126,7 +126,7 @@ fn diagnosed(bench: &BenchSpec, checks: Checks) -> Diagnosis {
 }
 
 #[test]
-fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
+fn an_error_that_a_check_measured_is_the_only_name() {
     let mut faulty = bench();
     faulty.instruments.force.gain = 0.04;
     let answer = diagnosed(&faulty, read(&faulty));

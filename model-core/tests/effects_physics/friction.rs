@@ -157,7 +157,7 @@ fn speed_and_pressure_laws() {
 }
 
 #[test]
-fn what_changes_the_balance_is_rubbed_with_it() {
+fn friction_scales_with_effects_that_change_the_balance() {
     let muscle = Muscle::<f64>::build(&table::example()).expect("a valid table");
     let pressure = Pressure::from_kilopascals(400.0);
     let motion = |stroke: f64, direction: f64| Motion { stroke, speed: 1e-3, direction, ..Motion::default() };

@@ -141,7 +141,7 @@ fn settled(ticks: &[Tick], scale: f64, value: impl Fn(&Tick) -> f64) -> usize {
 }
 
 #[test]
-fn what_was_out_of_reach_for_long_winds_no_integrator_up() {
+fn a_long_saturation_causes_no_integrator_windup() {
     let task = Task::of(presets::miniature());
     let bench = BenchSpec::laboratory(task.spec.clone(), 2);
     let blocked = task.blocked();

@@ -349,7 +349,7 @@ fn softening(client: &mut pam_device::Client, muscle: &Muscle<f32>, samples: usi
 }
 
 #[test]
-fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgotten() {
+fn the_memory_of_a_muscle_survives_a_power_cut_and_can_be_cleared() {
     let station = || {
         let bench = BenchSpec::laboratory(presets::miniature(), 7);
         Watched::new(PlantStation::new(bench, held_and_stretched(), 1e-3))

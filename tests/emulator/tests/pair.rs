@@ -70,7 +70,7 @@ fn a_stiffer_joint_gives_way_less_to_a_push_and_roughly_as_much_as_it_says() {
 }
 
 #[test]
-fn what_cannot_be_had_is_refused_with_what_can() {
+fn unavailable_angles_and_stiffnesses_are_refused_with_the_range() {
     let spec = presets::miniature();
     let bench = BenchSpec::laboratory(spec.clone(), 5);
     let start = || {

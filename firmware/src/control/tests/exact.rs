@@ -77,7 +77,7 @@ fn an_armed_device_disarms_in_the_tick_after_its_time() {
 }
 
 #[test]
-fn nobody_needs_to_keep_alive_what_is_vented() {
+fn a_vented_muscle_needs_no_keep_alive() {
     let mut vents = ready(|_| ());
     assert_eq!(vents.controller.start(Mode::Vent, OWNER), Ok(()));
     vents.hears_host = false;

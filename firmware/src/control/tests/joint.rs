@@ -139,7 +139,7 @@ fn a_joint_starts_where_it_is() {
 }
 
 #[test]
-fn what_a_joint_cannot_have_is_refused() {
+fn unreachable_angles_and_stiffnesses_are_refused() {
     let mut joint = Joint::new(None, |_| ()).start();
     let stiffness = joint.middle(0.0);
     let [low, high] = joint.stiffnesses(0.0);

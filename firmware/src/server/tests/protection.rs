@@ -280,7 +280,7 @@ fn a_start_after_the_watchdog_or_a_brown_out_is_a_latched_fault() {
 }
 
 #[test]
-fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
+fn memories_of_effects_are_stored_at_rest_and_before_a_restart() {
     let work = |shared: &Shared, by: f32| {
         shared.with(|controller| {
             let model = controller.model_mut(Side::Agonist).expect("a table");

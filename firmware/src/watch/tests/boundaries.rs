@@ -38,7 +38,7 @@ fn wide() -> Settings {
 }
 
 #[test]
-fn what_is_at_a_limit_is_not_beyond_it() {
+fn a_value_at_a_limit_is_not_beyond_it() {
     let settings = wide();
     let limits = settings.limits;
     let speed = |speed_m_per_s| Seen { speed_m_per_s, ..still(200e3, 0.0, 0.0) };

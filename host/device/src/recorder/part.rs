@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_cut_off_is_whole_again_and_replaces_nothing() {
+    fn a_cut_recording_is_completed_and_replaces_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         std::fs::write(&path, "an earlier recording\n").unwrap();

@@ -70,7 +70,7 @@ fn found(recording: Recording) -> Vec<Range<usize>> {
 }
 
 #[test]
-fn somebody_s_psi_are_found_and_bridged_while_the_muscle_strokes() {
+fn rows_in_psi_are_found_and_bridged_while_the_muscle_strokes() {
     let clean = recorded(120.0, 0.15, two_levels, as_read);
     let psi = |p: f64| p / PSI;
     // One in a stroke, one across a turn, one across the change of level.

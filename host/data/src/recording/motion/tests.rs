@@ -304,7 +304,7 @@ fn settled_points_of_a_staircase_turn_between_the_last_up_and_the_first_down() {
 }
 
 #[test]
-fn what_the_file_says_stands() {
+fn a_direction_in_the_file_is_kept() {
     let mut truth = carry_out(&loops(1, 5.0 * MM, 1.0 * MM), 10.0, 0.0, 0.0, 1);
     truth.recording.direction = Some(truth.direction.iter().map(|_| -1).collect());
     let found = Motion::of(&truth.recording);

@@ -117,7 +117,7 @@ fn a_damaged_file_is_kept_and_the_loss_said() {
 }
 
 #[test]
-fn what_is_no_recording_or_whole_is_left_alone() {
+fn files_that_are_complete_or_not_recordings_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (data, end) = recording();

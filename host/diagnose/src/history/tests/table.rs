@@ -76,7 +76,7 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
 
 /// A mounting that is 0.4 mm from its stated place: with the length that suits its readings most of its error is gone.
 #[test]
-fn what_a_wrong_length_adds_to_the_error_of_an_unseen_mounting_is_distinguished() {
+fn the_error_by_a_wrong_length_of_an_unseen_mounting_is_separated() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let mut campaign = campaign(&TRUTH);
     let unseen = |campaign: &Campaign| {
@@ -151,7 +151,7 @@ fn friction_that_grows_with_the_radius_is_in_the_table() {
 }
 
 #[test]
-fn what_the_tables_numbers_scatter_by_is_stored_with_them() {
+fn the_uncertainty_of_the_table_is_stored_with_it() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let file = table_fit::table(&campaign(&TRUTH), &muscle).expect("fitted").expect("staircases");
     let uncertainty = file.about.uncertainty.as_ref().expect("a jackknife over runs");

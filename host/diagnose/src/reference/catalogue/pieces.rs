@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_all_states_show_alike_is_few_pieces() {
+    fn an_error_common_to_all_states_counts_as_few_pieces() {
         let pieces = of_states(&states(|_| 1.0));
         assert!((1.0..2.0).contains(&pieces), "{pieces}");
         // An error of each level of its own, with no order among levels: six pieces.

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_all_rests_or_the_strokes_of_a_level_show_is_a_change() {
+    fn a_difference_of_all_rests_or_of_a_level_is_not_a_slip() {
         assert!(slips(|_, rest| if rest { 8.0 } else { 0.0 }).is_empty());
         assert!(slips(|l, _| if l == 2 { 8.0 } else { 0.0 }).is_empty());
     }
