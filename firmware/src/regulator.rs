@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_beyond_the_limit_is_cut_and_said() {
+    fn a_setpoint_beyond_the_limit_is_limited_and_reported() {
         let settings = Settings::default();
         let mut state = RegulatorState::default();
         let law = law(&settings.regulator);

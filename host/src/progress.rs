@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_line_tells_share_and_remaining_time() {
+    fn the_line_shows_share_and_remaining_time() {
         let quarter = line("fit", 25, 100, Duration::from_secs(20), 80);
         assert_eq!(quarter, "fit  ██████░░░░░░░░░░░░░░░░░░  25 %  1 min 00 s left");
         assert!(line("fit", 0, 100, Duration::from_secs(9), 80).ends_with("  0 %"));
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_stage_counts_anew() {
+    fn a_new_stage_restarts_the_count() {
         let progress = ProgressLine::silent();
         progress.stage("first", 3);
         progress.add(3);

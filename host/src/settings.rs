@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn the_command_line_goes_before_the_file_and_the_file_before_the_default() {
+    fn the_command_line_has_priority_over_the_file_and_that_over_the_default() {
         let settings = of("port = \"COM3\"\nmuscle = \"m.toml\"\n[fit]\norder = 3\n").unwrap();
         let order = |line: &[&str]| {
             let matches = apply(command(), &settings).try_get_matches_from(line).unwrap();

@@ -57,7 +57,7 @@ fn until_rows(folder: &Path, child: &mut Child, more_than: usize) {
 }
 
 #[test]
-fn a_killed_campaign_loses_no_row_and_goes_on() {
+fn a_killed_campaign_loses_no_row_and_continues() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let mut child = campaign(folder).spawn().unwrap();

@@ -171,7 +171,7 @@ fn there_is_a_manual_page_for_every_command() {
 }
 
 #[test]
-fn the_command_line_goes_before_the_environment_and_that_before_the_file() {
+fn the_command_line_has_priority_over_the_environment_and_that_over_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let deep = folder.path().join("a/b");
     std::fs::create_dir_all(&deep).unwrap();

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_that_begin_anew_do_not_take_the_allowance_away() {
+    fn ticks_that_restart_do_not_remove_the_allowance() {
         let minutes = |count: u64| count * u64::from(REFILL_TICKS);
         let mut wear = Wear::default();
         let used = minutes(1_000);

@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_person_is_asked_once_for_each_stroke() {
+    fn an_operator_is_prompted_once_for_each_stroke() {
         let mut output = Vec::new();
         let mut prompt = Prompt::new(std::io::Cursor::new("\n\n"), &mut output, Arc::default());
         for stroke in [0.0, 12.5e-3, 12.5e-3, 0.0] {

@@ -264,7 +264,7 @@ fn a_rest_length_that_is_held_within_the_noise_of_a_sensor_is_no_stroke() {
 }
 
 #[test]
-fn units_that_no_name_says_are_those_that_suit_all_files() {
+fn units_without_a_name_are_taken_from_all_files() {
     let file = |bar: f64, mm: f64| {
         let rows = stroke(|[t, _, x, f]| format!("{t:.2},{bar},{:.4},{f:.3}", 0.25 * x * mm));
         format!("time,pressure,stroke,force\n{rows}").into_bytes()

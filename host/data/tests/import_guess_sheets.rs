@@ -94,7 +94,7 @@ fn with_mark(seconds: f64) -> String {
 }
 
 #[test]
-fn a_time_of_day_that_passes_midnight_goes_on() {
+fn a_time_of_day_continues_past_midnight() {
     let header = "time,pressure_kPa,displacement_mm,force_N\n";
     for stamp in [time_of_day, with_mark] {
         let text = lines(&rows(86_399.0, 300.0), |[t, p, x, f]| format!("{},{p},{x},{f}", stamp(t)));

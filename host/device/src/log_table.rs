@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_come_out_in_words_and_foreign_frames_are_refused() {
+    fn log_lines_are_decoded_and_other_frames_are_refused() {
         let mut frame = vec![1, 0, 7, 0, 0, 0, 12];
         frame.extend(1_000_u64.to_le_bytes());
         let line = table().decode(&frame).unwrap();

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_criterion_has_a_name_of_its_own_and_says_what_it_means() {
+    fn every_criterion_has_a_unique_name_and_a_meaning() {
         let mut names: Vec<&str> = PAGE.iter().flat_map(|s| s.criteria).map(|c| c.name).collect();
         let all = names.len();
         names.sort_unstable();

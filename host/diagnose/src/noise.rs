@@ -249,7 +249,7 @@ mod tests {
     /// A residual that drifts slowly through each recording: friction, which changes its sign with every stroke, is estimated beside it
     /// from many rows, a drift from as few as the residual itself.
     #[test]
-    fn a_slow_residual_says_little_about_slow_traces_only() {
+    fn a_slow_residual_weakens_slow_traces_only() {
         let campaign = recorded(loops(&[0.2]), 4, |_, _| 0.0, |_, _, _| 0.0);
         let (rows, _) = prepare(&campaign, &geometry().build().expect("a braid")).expect("rows");
         let step = typical_step(&rows);

@@ -180,7 +180,7 @@ fn the_end_of_the_sensors_range_is_no_physics() {
 }
 
 #[test]
-fn wandering_noise_and_outliers_are_not_named() {
+fn drifting_noise_and_outliers_are_not_named() {
     for seed in 10..13 {
         let wander = |r: &mut Random, s: &mut [f64; 2]| {
             s[0] += 0.02 * r.normal();
@@ -243,7 +243,7 @@ fn a_late_cell_is_distinguished_from_a_loose_joint_and_its_dead_time_found() {
 }
 
 #[test]
-fn an_unknown_zero_is_not_called_a_lag_that_nobody_has_seen() {
+fn an_unknown_zero_is_not_called_an_unobserved_lag() {
     // At one speed a settling of most of the pull within 0.3 s would take the misfit as well.
     for (speed, offset) in [(1.0, 4.0), (1.0, 8.0), (3.0, 8.0)] {
         let d = ask(&recorded(loops(&[speed]), 5, coloured(0.1, 2.0), |_, _, _| offset));
@@ -358,7 +358,7 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn bad_input_is_answered_in_words() {
+fn bad_input_is_answered_with_a_message() {
     let straight = |n: usize, f: &dyn Fn(f64) -> (f64, f64, f64)| {
         let mut r = Recording { name: "r".into(), ..Recording::default() };
         let mut force = Vec::new();

@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_in_which_nothing_stands_is_not_shown() {
+    fn an_empty_column_is_not_shown() {
         let mut table = Table::new("", &["name", "remark", "value", "more"]);
         table.row(["a", "", "1", ""]);
         table.row(["b", "", "", ""]);

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_connection_beyond_the_limit_is_closed_and_the_others_go_on() {
+    fn a_connection_beyond_the_limit_is_closed_and_the_others_continue() {
         let address = start(Limits { connections: 1, ..Limits::default() });
         let mut first = connect(address);
         let ask = |stream: &mut TcpStream| {

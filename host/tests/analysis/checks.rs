@@ -165,7 +165,7 @@ fn a_play_that_a_rigid_bar_shows_is_named_where_it_matters() {
 }
 
 #[test]
-fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
+fn weighing_shows_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
     let size = 0.04 * 120.0;
     let (mut heavy, mut offset) = (bench(), bench());
     heavy.rig.weight = size;
@@ -200,7 +200,7 @@ fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
 
 /// Loops hardly distinguish a leak from a friction that differs between the directions, or from a gauge that reads too much.
 #[test]
-fn a_closed_valve_says_whether_a_loss_of_pull_is_a_leak() {
+fn a_closed_valve_shows_whether_a_loss_of_pull_is_a_leak() {
     // The recordings do not show the smaller leak; the valve does.
     for leak in [0.05, 0.01, 0.0] {
         let mut bench = bench();

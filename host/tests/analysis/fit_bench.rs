@@ -255,7 +255,7 @@ fn a_spike_is_found_listed_and_does_no_harm() {
 }
 
 #[test]
-fn stress_rises_with_strain_where_it_is_asked_for() {
+fn stress_rises_with_strain_where_it_is_required() {
     let spec = presets::contractile();
     let campaign = thesis(&spec, &presets::large_pressures(), 4, 8.0);
     let options = Options { physical: true, ..Options::default() };

@@ -183,7 +183,7 @@ fn one_held_length_determines_no_deadband() {
 /// A length that is read again in each run is one length: three mountings determine no more coefficients than three lengths do, and a length
 /// between them is predicted.
 #[test]
-fn a_mounting_whose_length_is_read_anew_in_each_run_is_one_length() {
+fn a_mounting_whose_length_is_read_again_in_each_run_is_one_length() {
     let (mut noise, mut gauge) = (Noise::new(7, 0.0), Noise::new(8, 0.0));
     let mut run = |stroke: f64| {
         let mut r = Recording { force: Some(Vec::new()), ..Recording::default() };
@@ -399,7 +399,7 @@ fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_does_not_bend_the
 
 /// A muscle that hangs slack nearly everywhere leaves too few rows for an answer, and the answer states the reason.
 #[test]
-fn where_slack_rows_leave_too_few_to_judge_the_remarks_say_so() {
+fn the_remarks_report_where_slack_rows_leave_too_few_to_judge() {
     let mut noise = Noise::new(9, 0.0);
     let mut recordings = SIX.map(|p| strokes(p, 40, 8.0, 0.0, 0, (0.05, &mut noise)));
     for r in &mut recordings {

@@ -83,7 +83,7 @@ fn a_force_in_another_unit_is_reported_though_fitted_dimensions_describe_it() {
 }
 
 #[test]
-fn mountings_of_equal_length_are_kept_apart_by_their_labels() {
+fn mountings_of_equal_length_are_separated_by_their_labels() {
     let spec = presets::contractile();
     let mut all = Vec::new();
     for label in ["first", "second"] {

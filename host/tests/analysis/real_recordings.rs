@@ -71,7 +71,7 @@ fn every_muscle_of_2021_has_its_settled_points() {
 }
 
 #[test]
-fn the_pressure_alone_tells_filling_from_emptying() {
+fn the_pressure_alone_distinguishes_filling_from_emptying() {
     for mm in [83, 182, 382] {
         let muscle = format!("festo10-2022-{mm}mm.toml");
         let Some(campaign) =

@@ -83,7 +83,7 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
 }
 
 #[test]
-fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hold() {
+fn an_autonomous_device_continues_and_holds_where_a_hold_is_set() {
     let folder = Folder::new();
     let station = station();
     let Some(machine) = board(&folder, &station, false) else { return };
@@ -195,7 +195,7 @@ const TASKS_VECTOR: u32 = (16 + 10) * 4;
 const HANG: u16 = 0xE7FE;
 
 #[test]
-fn a_program_that_hangs_is_restarted_vented_and_says_so() {
+fn a_program_that_hangs_is_restarted_vented_and_reports_it() {
     let folder = Folder::new();
     let station = station();
     let Some(machine) = board(&folder, &station, true) else { return };

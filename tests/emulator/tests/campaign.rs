@@ -146,7 +146,7 @@ fn prompted(folder: &Path, bench: &Bench) -> (Child, Arc<Mutex<String>>) {
 }
 
 #[test]
-fn an_operator_is_prompted_in_words_and_may_end_the_campaign_there() {
+fn an_operator_is_prompted_and_may_end_the_campaign_there() {
     let folder = folder("axis = 'prompt'\nstroke_max_mm = 12.0\n");
     let folder = folder.path();
     let bench = Bench::start(folder, SPEED);

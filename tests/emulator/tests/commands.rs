@@ -84,7 +84,7 @@ impl Stand {
 }
 
 #[test]
-fn a_joint_takes_angle_and_stiffness_and_says_which_it_can_have() {
+fn a_joint_takes_angle_and_stiffness_and_reports_the_available_range() {
     let spec = presets::contractile();
     let joint = Arc::new(Mutex::new(pair::elbow(&spec)));
     let [first, second] = joint::Side::both(&joint);

@@ -186,7 +186,7 @@ fn a_fault_whose_cause_is_still_there_is_not_cleared() {
 }
 
 #[test]
-fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
+fn a_host_that_falls_silent_and_a_hold_that_was_requested() {
     let folder = Folder::new();
     let station = station();
     // No faster than a real board: the first setpoint must come before its silence is noticed.

@@ -76,7 +76,7 @@ fn check(image: &Path, map: &str) {
 }
 
 #[test]
-fn each_image_lies_where_its_boards_map_says() {
+fn each_image_lies_at_the_addresses_of_its_boards_map() {
     let (Ok(emulated), Ok(nucleo)) = (machine::image(), machine::nucleo_image()) else { return };
     check(&emulated, include_str!("../../../memory.x"));
     check(&nucleo, include_str!("../../../firmware/memory/nucleo-f446re.x"));

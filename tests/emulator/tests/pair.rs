@@ -36,7 +36,7 @@ fn angle_and_stiffness_are_both_reached_wherever_both_muscles_can_pull() {
 }
 
 #[test]
-fn a_stiffer_joint_gives_way_less_to_a_push_and_roughly_as_much_as_it_says() {
+fn a_stiffer_joint_yields_less_to_a_push_and_roughly_as_much_as_stated() {
     let stiffnesses = [80.0, 110.0, 140.0, 170.0, 200.0, 230.0, 260.0];
     let mut ratios = Vec::new();
     let mut gave = Vec::new();

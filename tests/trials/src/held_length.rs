@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_counted_as_what_it_says_about_the_effect() {
+    fn an_answer_is_counted_by_its_statement_about_the_effect() {
         let said = |answer: &Answer| Said::of(answer, "log-creep", 5.0);
         assert!(said(&answer(&["log-creep"], &[], None)) == Said::Named);
         assert!(said(&answer(&["stress-relaxation"], &[], None)) == Said::InClassOrSet);

@@ -34,7 +34,7 @@ fn a_seat_holds_the_last_table_that_could_be_used() {
 }
 
 #[test]
-fn a_table_that_is_exchanged_begins_anew() {
+fn the_state_of_an_exchanged_table_restarts() {
     let rubbing = with(EffectName::CoulombFriction, &[2.0, 2.0]);
     let mut model = shortened(&rubbing, 2e-3, 400e3);
     for _ in 0..300 {

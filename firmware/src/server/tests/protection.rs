@@ -144,7 +144,7 @@ fn an_armed_device_is_not_restarted() {
 }
 
 #[test]
-fn pieces_end_where_the_upload_was_said_to_end() {
+fn pieces_end_at_the_stated_end_of_the_upload() {
     let shared = Shared::new(Settings::default());
     let mut server = started(MockFlash::erased(), &shared);
     let piece = |offset, length: usize| TablePiece {

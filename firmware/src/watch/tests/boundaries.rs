@@ -207,7 +207,7 @@ fn a_restart_forgets_what_was_counted_but_not_how_long_the_muscle_has_been_vente
 }
 
 #[test]
-fn table_and_load_cell_may_be_apart_by_as_much_as_the_bound() {
+fn table_and_load_cell_may_differ_by_the_bound() {
     let mut settings = wide();
     settings.watch.disagree_n = 10.0;
     let apart = |by: f32| Seen { model_n: Some(40.0 + by), ..still(200e3, 0.0, 40.0) };
@@ -220,7 +220,7 @@ fn table_and_load_cell_may_be_apart_by_as_much_as_the_bound() {
 }
 
 #[test]
-fn one_good_tick_begins_every_count_anew() {
+fn one_good_tick_restarts_every_count() {
     let mut settings = wide();
     settings.watch.follow_ticks = 3;
     settings.watch.debounce_ticks = 3;
@@ -272,7 +272,7 @@ fn the_higher_of_two_pressure_sensors_is_judged_while_both_are_watched() {
 }
 
 #[test]
-fn two_watches_that_count_alike_are_both_reported_and_both_begin_anew_in_a_good_tick() {
+fn two_watches_with_equal_counts_are_both_reported_and_both_restart_in_a_good_tick() {
     let settings = wide();
     let limits = settings.limits;
     let good = still(200e3, 0.0, 0.0);

@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn utf_16_is_read_whole_however_it_comes_and_is_asked_for() {
+    fn utf_16_is_read_whole_in_pieces_of_any_size() {
         let text = "time_s\t°C\t\u{1d53d}\u{20ac}\n".repeat(40);
         for big_endian in [false, true] {
             let bytes = |u: u16| if big_endian { u.to_be_bytes() } else { u.to_le_bytes() };

@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_states_outlive_a_pause_and_start_anew_with_a_mounting() {
+    fn the_states_outlive_a_pause_and_restart_with_a_mounting() {
         let points = held(2, 2);
         let z = Clockwork::new(&points, 5.0, &super::super::criteria::TIMES).mean_state(&vec![1.0; 400], 0.0);
         assert!(z[100] > z[0] + 0.2, "the second run starts from the first: {} {}", z[0], z[100]);

@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn direction_turns_once_whatever_the_ripple() {
+    fn direction_reverses_once_despite_ripple() {
         let r = staircase(100.0, 0.5);
         let (points, _) = settled(&r, r.force.as_deref().expect("force"));
         assert_eq!(points.windows(2).filter(|w| w[0].direction != w[1].direction).count(), 1);

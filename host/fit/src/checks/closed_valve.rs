@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tight_muscle_loses_nothing_that_matters_and_a_torn_one_does() {
+    fn a_tight_muscle_loses_nothing_that_matters_and_a_leaking_one_does() {
         assert!(table(1e-4).unwrap().lost_part().1 < 1e-3);
         assert!(table(10.0).unwrap().lost_part().0 > 5e-3);
     }

@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_changed_is_not_said_without_doubt_where_there_is_some() {
+    fn nothing_changed_is_stated_with_its_doubt() {
         assert!(consistent(0.58).contains("is only 0.58"));
         assert!(consistent(0.97).starts_with("Nothing changed"));
     }

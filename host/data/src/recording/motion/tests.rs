@@ -213,7 +213,7 @@ fn slow_motion_under_noise_turns_within_what_noise_hides() {
 }
 
 #[test]
-fn direction_is_kept_through_a_rest_and_changes_when_motion_goes_on() {
+fn direction_is_kept_through_a_rest_and_changes_when_motion_continues() {
     let path = [
         Piece::Rest(3.0),
         Piece::Go(5.0 * MM, 1.0 * MM),

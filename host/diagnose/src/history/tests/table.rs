@@ -60,7 +60,7 @@ fn campaign_after(effects: &[FittedEffect], earlier_load: Option<EarlierLoad>) -
 }
 
 #[test]
-fn a_table_carries_the_memory_and_foretells_unseen_runs() {
+fn a_table_carries_the_memory_and_predicts_unseen_runs() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let campaign = campaign(&TRUTH);
     let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
