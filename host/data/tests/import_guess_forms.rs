@@ -245,7 +245,7 @@ fn missing_data_are_reported_with_the_right_remedy() {
         format!("{},{p},{x:.3},{f:.3}", (4_294_000_000 + (t * 1e6) as u64) % (1 << 32))
     });
     let wraps = unknown(format!("micros,pressure_kPa,displacement_mm,force_N\n{rows}"));
-    assert!(wraps.contains("a counter of 32 bits began again behind row 20"), "{wraps}");
+    assert!(wraps.contains("a counter of 32 bits overflowed after row 20"), "{wraps}");
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},{x:.3},{f:.3},{:.2},{p},{x:.3},{f:.3}", t + 0.3));
     let two = format!("Time_1,Press_1,Ext_1,Load_1,Time_2,Press_2,Ext_2,Load_2\n{rows}");
     assert_eq!(read(&[("a.csv", two.into())]).0.side_by_side, Some((2, 4)));

@@ -267,7 +267,7 @@ fn usual(names: &[String], quantity: Quantity) -> Result<Usual<'_>> {
 fn unknown_unit(quantity: Quantity, name: &str) -> Error {
     let usual = usual_name(name);
     let cause = match usual.strip_prefix(quantity.name()) {
-        Some("") => format!("the column `{name}` does not say its unit"),
+        Some("") => format!("the column `{name}` has no unit"),
         Some(unit) => format!("unknown unit `{}` of {}", unit.trim_start_matches('_'), quantity.name()),
         None => format!("unknown unit of {}", quantity.name()),
     };

@@ -123,7 +123,7 @@ pub struct Guess {
     pub split_by: Vec<String>,
     /// Whether a run begins where the time goes back.
     pub new_run_by_clock: bool,
-    /// How many recordings stand side by side, and how many columns are from one to the next.
+    /// How many recordings are side by side, and how many columns are from one to the next.
     pub side_by_side: Option<(usize, usize)>,
     /// Columns that were understood.
     pub columns: Vec<GuessedColumn>,

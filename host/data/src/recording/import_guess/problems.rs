@@ -117,7 +117,7 @@ pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
             .to_owned()
     } else if let Some((row, bits)) = wraps(time) {
         let size = 1_u64 << bits;
-        format!("a counter of {bits} bits began again behind row {row}: add {size} to the times that follow")
+        format!("a counter of {bits} bits overflowed after row {row}: add {size} to the times that follow")
     } else {
         "no column says which run a row belongs to: make one file of each run, or remove the rows that are given twice".to_owned()
     };

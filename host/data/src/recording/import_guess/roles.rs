@@ -246,7 +246,7 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
     let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
         let (low, high) = column.range();
         return Err(format!(
-            "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
+            "{header} looks like {what}, but neither its name nor its values ({} to {}) show the unit",
             short(low),
             short(high)
         ));
@@ -257,7 +257,7 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
     } else {
         format!(" (or {})", suggested.others.join(", "))
     };
-    let check = format!("{header} does not say its unit; its values look like {unit}{others}");
+    let check = format!("{header} has no unit; its values look like {unit}{others}");
     Ok(GuessedUnit { unit, scale, check: Some(check), ..plain })
 }
 

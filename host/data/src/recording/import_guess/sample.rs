@@ -268,7 +268,7 @@ impl Sample {
         }
         if let Some(first) = again.first() {
             self.notes.push(format!(
-                "lines above the table stand again among the rows, first in line {first}, and are left out"
+                "lines above the table are repeated among the rows, first in line {first}, and are left out"
             ).into());
         }
         self.rows = rows.len();
