@@ -297,7 +297,7 @@ impl Connected {
                 }
                 let reachable = Reachability::of(&mut self.client)?;
                 if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
-                    return Err(Error::new(DataCode::CallInvalid, words).help("ask for less"));
+                    return Err(Error::new(DataCode::CallInvalid, words).help("request less"));
                 }
                 if self.status.state == State::Running && !self.client.controls() {
                     return Err(messages::in_use("start"));
