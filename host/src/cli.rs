@@ -27,7 +27,7 @@ use pam_data::output::reader_left;
     host diagnose --muscle mini.toml loops/*.csv --report why.html\n  \
     host studio --emulate\n\n\
     Results for programs: fit, evaluate, predict, diagnose, history and plan write JSON into the file behind --json (`-` is standard \
-    output); with all others --json stands alone, and they print it in place of words.\n\n\
+    output); with all others --json stands alone, and they print it in place of text.\n\n\
     Exit status: 0 done, 1 the input or the device is at fault, 2 the call is at fault.")]
 pub struct Cli {
     #[command(flatten)]
