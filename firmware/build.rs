@@ -1,7 +1,7 @@
 //! Picks the memory map of the board that is built.
 //!
 //! The emulated board's map is the top level's `memory.x`, which cortex-m-rt's script finds because cargo links there. Any other
-//! board is linked by a script of its own: a second `memory.x` would never be looked at.
+//! board is linked by a script of its own: a second `memory.x` would never be read.
 
 use std::path::{Path, PathBuf};
 use std::{env, error::Error, fs};

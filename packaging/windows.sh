@@ -67,7 +67,7 @@ for called in wine native; do
     "${program[@]}" --quiet fit --muscle demo/muscle.toml demo/0*.csv -o $called.pam --json fit-$called.json --report fit-$called.html > /dev/null
     "${program[@]}" --quiet diagnose --muscle demo/muscle.toml demo/0*.csv --json diagnosis-$called.json > /dev/null
 done
-if wine "$bin/pam.exe" fit --muscle none.toml none.csv -o none.pam 2> error.txt; then fail "a missing file is no failure"; fi
+if wine "$bin/pam.exe" fit --muscle none.toml none.csv -o none.pam 2> error.txt; then fail "a missing file is not a failure"; fi
 grep -q "none.toml" error.txt || fail "the error does not name the missing file"
 python3 - <<'COMPARE' || fail "results differ from those of this machine"
 import json

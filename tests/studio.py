@@ -5,7 +5,7 @@
 
 Connect, load, fit, difference, flash, arm, follow, fault, clear, vent by key, compare, close the page; ten minutes of samples through
 the page's own code, with the memory and the time for a picture bounded; and who may ask at all. With a folder, every view is
-photographed in light and dark, wide and on a phone; with BOOK=overwrite the book's picture of the page is taken anew. An hour of
+photographed in light and dark, wide and on a phone; with BOOK=overwrite the book's picture of the page is taken again. An hour of
 live pictures is measured by tests/benchmarks/studio.py.
 Needs chromium and chromedriver, nothing of Python beyond its own library.
 """
@@ -124,7 +124,7 @@ def reads_where_one_points(page):
     assert page.text("cursor-time") == "", page.text("cursor-time")
     # No value is shown where no curve is drawn: before the first sample, after the last one and where samples are missing.
     blank = page.js("""const read = (time) => { point((time - scopes[0].from) / (scopes[0].to - scopes[0].from)); return document.querySelector("[data-of=F]").textContent; };
-      // How often a curve of this time is begun anew, and whether anything is drawn there.
+      // How often a curve of this time is restarted, and whether anything is drawn there.
       const parts = () => { const g = scopes[0].axes.g, moved = g.moveTo; let n = 0; g.moveTo = function (x, y) { n++; return moved.call(this, x, y); }; scopes[0].draw(view); g.moveTo = moved; return n; };
       const end = shown.last("t"), whole = parts(), inside = read(end - 2);
       for (let k = 0; k < shown.length; k++) if (shown.get("t", k) <= end - 2) shown.columns.t[shown.index(k)] -= 1;
@@ -134,7 +134,7 @@ def reads_where_one_points(page):
       scopes[0].to += 5; found.after = read(end + 4); point(null); return found""")
     assert blank["before"] == blank["after"] == blank["gap"] == "measured", blank
     assert all(v.startswith("measured ") for v in (blank["inside"], *blank["edges"], blank["last"])), blank
-    # Measured, setpoint and table each begin anew once.
+    # Measured, setpoint and table each restart once.
     assert blank["begins"] == 3, blank
     page.over("h1")
     page.click("hold")

@@ -34,7 +34,7 @@ LONGEST_BODY = 512
 
 
 class LinkError(Exception):
-    """The line is broken, or what comes is no answer of this protocol."""
+    """The line is broken, or what comes is not an answer of this protocol."""
 
 
 class Refused(Exception):

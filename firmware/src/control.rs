@@ -41,7 +41,7 @@ use actuator::Actuator;
 use arming::Arming;
 
 /// Something whose address is kept in a register. There is one controller, at an address that the compiler knows: it would add up the
-/// address of each number anew.
+/// address of each number again.
 #[inline(always)]
 fn in_register<T>(of: &T) -> &T {
     core::hint::black_box(of)
@@ -63,7 +63,7 @@ enum Notice {
     TraceFull,
 }
 
-/// The whole controller but for its board, its link and its store.
+/// The whole controller without its board, its link and its store.
 #[derive(Debug)]
 pub struct Controller {
     settings: Settings,

@@ -27,14 +27,14 @@ pub const BLOCK_TICKS: u16 = SAMPLE_TICKS * BLOCK_SAMPLES;
 /// Blocks after which a weight has fallen to 1/e: 4.4 minutes of running.
 pub const WINDOW: u16 = 1024;
 /// Part of the blocked force that a shape may explain, rms: the mean error that a good table has on recordings that it was not fitted to
-/// is below that, so that a smaller difference is no change.
+/// is below that, so that a smaller difference is not a change.
 pub const TOLERANCE: f32 = 0.01;
 /// Standard errors above the tolerance at which the state becomes `Changed`. Nine shapes, each tested over about one independent
 /// window in four minutes, and a variance estimated from [`ENOUGH`] blocks.
 pub const ALARM: f32 = 6.0;
 /// Standard errors above the tolerance below which the state is `Describes` again.
 pub const CLEAR: f32 = 3.0;
-/// Independent blocks before anything is said.
+/// Independent blocks before anything is reported.
 pub const ENOUGH: f32 = 30.0;
 /// The highest correlation of neighbouring blocks that is believed; above it there are never enough.
 const CORRELATION: f32 = 0.99;

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | the control step, one pure function | [`control`] |
 //! | pressure for force and stroke | [`modes`] |
-//! | a joint of two muscles: angle, stiffness, what can be had | [`pair`] |
+//! | a joint of two muscles: angle, stiffness, what is available | [`pair`] |
 //! | states and faults, each in one table | [`safety`] |
 //! | how faults are noticed | [`watch`] |
 //! | whether the table still describes the muscle | [`health`] |
@@ -26,7 +26,7 @@
 //! | log lines on their way to the host | `log` (feature of that name) |
 //! | all of it in a host's own process | `native` (feature of that name) |
 //!
-//! Nothing here knows a board, and nothing but `main` knows which board it is.
+//! Nothing here knows a board, and only `main` knows which board it is.
 
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 

@@ -224,7 +224,7 @@ impl Model {
         self.taut_n
     }
 
-    /// The pressure for a demanded force in this tick, and whether it can be had; `rests` where friction is not to turn while the same
+    /// The pressure for a demanded force in this tick, and whether it can be reached; `rests` where friction is not to turn while the same
     /// force is demanded, `share` of it corrected.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {
         let still_s = if self.demand.force_n == force_n { self.demand.still_s + TICK_S } else { 0.0 };

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_is_small() {
+    fn queued_messages_are_small() {
         assert!(size_of::<Outgoing>() <= 80, "{}", size_of::<Outgoing>());
     }
 }

@@ -1,4 +1,4 @@
-//! Two muscles on one pulley: from an angle and a stiffness to two forces, and which stiffness there is to be had.
+//! Two muscles on one pulley: from an angle and a stiffness to two forces, and which stiffness is available.
 //!
 //! ```text
 //! x₁ = x_rest + r θ,  x₂ = x_rest − r θ        strokes
@@ -65,12 +65,12 @@ pub struct Posed {
 pub struct Pull {
     /// Forces, N.
     pub forces_n: [f32; 2],
-    /// Whether the stiffness can be had beside the torque that the angle takes; the angle goes first.
+    /// Whether the stiffness is available beside the torque that the angle takes; the angle goes first.
     pub reached: bool,
 }
 
 impl PairState {
-    /// Begins anew, at the force that both muscles have at their pressures: below zero where they are slack.
+    /// Restarts, at the force that both muscles have at their pressures: below zero where they are slack.
     pub fn begin(&mut self, arms: [Arm<'_>; 2]) {
         let quasi = arms.map(|arm| {
             single_precision::parts(
@@ -163,7 +163,7 @@ fn stiffness_at(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32, tension_n: f3
     joint.radius_m * joint.radius_m * (resists(arms[0], turn) + resists(arms[1], -turn))
 }
 
-/// Whether an angle and a stiffness can be had without a load on the joint.
+/// Whether an angle and a stiffness are available without a load on the joint.
 ///
 /// # Errors
 /// [`Refusal::Angle`] or [`Refusal::Stiffness`] with what can.

@@ -15,7 +15,7 @@ use crate::tick::{TICK_S, TICKS_PER_S};
 /// Points that a reference table holds, three bytes each ([`CompactFloat`]).
 pub const CAPACITY: usize = 256;
 
-/// Ticks that a wave can be looked at ahead of its time.
+/// Ticks that a wave can be evaluated ahead of its time.
 const AHEAD: usize = 16;
 
 const TURN: f32 = 4_294_967_296.0;

@@ -176,7 +176,7 @@ impl RegulatorState {
         };
     }
 
-    /// Demands anew from where the muscle is; the model of line and muscle continues.
+    /// Demands again from where the muscle is; the model of line and muscle continues.
     pub fn demand_from(&mut self, pressure_pa: f32) {
         let Self { supplied_pa, model_pa, .. } = *self;
         self.begin(pressure_pa);
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_beyond_the_limit_is_cut_and_said() {
+    fn a_setpoint_beyond_the_limit_is_limited_and_reported() {
         let settings = Settings::default();
         let mut state = RegulatorState::default();
         let law = law(&settings.regulator);
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_empty_stays_so_when_it_is_vented() {
+    fn an_empty_regulator_stays_empty_when_vented() {
         for (offset_pa, pressure_pa, empty) in
             [(0.0, 0.0, true), (-4e3, 0.0, true), (4e3, 0.0, false), (0.0, 1.0, false)]
         {

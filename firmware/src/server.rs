@@ -70,7 +70,7 @@ pub fn table_fault(error: ImageError) -> TableFault {
 }
 
 impl<F: NorFlash> Server<F> {
-    /// Opens the store, counts the start, and gives the controller its settings and tables. A damaged store is made anew,
+    /// Opens the store, counts the start, and gives the controller its settings and tables. A damaged store is made again,
     /// a damaged table is not used; both latch a fault, so that someone looks before anything moves.
     ///
     /// # Errors
@@ -293,7 +293,7 @@ impl<F: NorFlash> Server<F> {
 }
 
 /// Has the controller use the kept settings. What is damaged or of another layout is taken over as far as it can be, and latches a
-/// fault: the device cannot be armed until someone has looked at the settings in force and sent them.
+/// fault: the device cannot be armed until someone has checked the settings in force and sent them.
 #[inline(never)]
 fn use_settings<F: NorFlash>(store: &mut Store<F>, damaged: bool, shared: &Shared) -> Result<(), StoreFault> {
     let hardware = shared.with(|controller| controller.hardware());

@@ -1,4 +1,4 @@
-//! What the tasks share: the controller, and what waits to be said to the host.
+//! What the tasks share: the controller, and what waits to be sent to the host.
 
 use core::cell::{RefCell, RefMut};
 use core::mem::ManuallyDrop;

@@ -106,7 +106,7 @@ impl Sums {
         }
     }
 
-    /// Gives the means and begins anew.
+    /// Gives the means and restarts.
     pub fn take(&mut self, answer: &mut MeanSignals) {
         let Self { ticks, sums, second_pressure, supply, .. } =
             core::mem::replace(self, Self { read: true, ..Self::default() });

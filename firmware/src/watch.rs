@@ -178,7 +178,7 @@ pub struct Seen {
 }
 
 impl SideWatch {
-    /// Begins anew, but for how long the muscle has been vented.
+    /// Restarts, except for how long the muscle has been vented.
     pub fn restart(&mut self) {
         *self = Self { vented_ticks: self.vented_ticks, ..Self::default() };
     }
@@ -272,7 +272,7 @@ impl SideWatch {
         let over_speed = has_stroke && speed_m_per_s.abs() > limits.speed_m_per_s;
         let over_stroke = has_stroke && out_of_stroke;
         let counting = self.over_pressure.0 | self.over_force.0 | self.over_stroke.0 | self.over_speed.0;
-        // Most ticks have nothing to count and nothing to begin anew.
+        // Most ticks have nothing to count and nothing to restart.
         if !(over_pressure | over_force | over_stroke | over_speed) && counting == 0 {
             return;
         }

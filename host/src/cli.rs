@@ -27,7 +27,7 @@ use pam_data::output::reader_left;
     host diagnose --muscle mini.toml loops/*.csv --report why.html\n  \
     host studio --emulate\n\n\
     Results for programs: fit, evaluate, predict, diagnose, history and plan write JSON into the file behind --json (`-` is standard \
-    output); with all others --json stands alone, and they print it in place of words.\n\n\
+    output); with all others --json stands alone, and they print it in place of text.\n\n\
     Exit status: 0 done, 1 the input or the device is at fault, 2 the call is at fault.")]
 pub struct Cli {
     #[command(flatten)]
@@ -39,10 +39,10 @@ pub struct Cli {
 /// What every sub-command does with its messages.
 #[derive(Debug, Clone, Args)]
 pub struct Output {
-    /// Say nothing but results and errors.
+    /// Print only results and errors.
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Messages")]
     quiet: bool,
-    /// Say more about what is done, and how long it took.
+    /// Print what is done, and how long it took.
     #[arg(short, long, global = true, help_heading = "Messages")]
     verbose: bool,
     /// Colours in messages: auto (on a terminal, and not where `NO_COLOR` is set), always or never.
@@ -92,7 +92,7 @@ enum Command {
     Stock(commands::stock::Arguments),
     /// Explain what the model leaves out, effect by effect.
     Effects(commands::effects::Arguments),
-    /// Plan recordings: protocols by what they are expected to tell, best first; or what a planned protocol can distinguish.
+    /// Plan recordings: protocols by their expected information, best first; or what a planned protocol can distinguish.
     Plan(commands::plan::Arguments),
     /// Record, check, fit and diagnose automatically: the program chooses each step of the campaign.
     Campaign(commands::campaign::Arguments),
@@ -190,7 +190,7 @@ fn parse() -> Result<Cli> {
 
 /// Prints help or the version, or what is wrong with a call, and ends: with status 2 for the last.
 ///
-/// A reader that stopped reading (`| head`) is no failure; a full disk is, and comes back as an error.
+/// A reader that stopped reading (`| head`) is not a failure; a full disk is, and comes back as an error.
 fn ended(words: &clap::Error) -> Error {
     // A name that a shell has put in the place of `*` may hold anything.
     let plain = words.render().to_string();

@@ -27,7 +27,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// What is said about commands, with the name by which the program was called.
+/// Messages about commands, with the name by which the program was called.
 fn said(text: impl Display) -> String {
     let text = in_called_name(text.to_string());
     match printable(&text) {
@@ -82,7 +82,7 @@ impl Console {
         Self { quiet, verbose, colour }
     }
 
-    /// A console that says nothing but errors, for use inside programs and tests.
+    /// A console that prints only errors, for use inside programs and tests.
     #[must_use]
     pub fn silent() -> Self {
         Self::new(true, false, Colour::Never)
@@ -106,7 +106,7 @@ impl Console {
         self.verbose
     }
 
-    /// A result, on standard output. A reader that stopped reading (`| head`) is no failure; any other failure is reported by
+    /// A result, on standard output. A reader that stopped reading (`| head`) is not a failure; any other failure is reported by
     /// [`unprinted`] when the command has ended.
     pub fn result(&self, text: impl Display) {
         if let Err(error) = print(format!("{}\n", said(text)).as_bytes()) {
@@ -121,7 +121,7 @@ impl Console {
         }
     }
 
-    /// A detail, on standard error, where `--verbose` asks for it.
+    /// A detail, on standard error, where `--verbose` requires it.
     pub fn detail(&self, text: impl Display) {
         if self.verbose {
             let _ = writeln!(std::io::stderr().lock(), "{}", said(text));

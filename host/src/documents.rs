@@ -46,10 +46,7 @@ mod tests {
             std::fs::write(&path, &schema).unwrap();
         }
         let there = std::fs::read_to_string(&path).unwrap_or_default();
-        assert_eq!(
-            there, schema,
-            "{name}: `SCHEMA=overwrite cargo test -p host --lib schema` writes it anew"
-        );
+        assert_eq!(there, schema, "{name}: `SCHEMA=overwrite cargo test -p host --lib schema` rewrites it");
     }
 
     #[test]

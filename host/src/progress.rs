@@ -15,7 +15,7 @@ const REDRAW: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_millis(400);
 /// Width of the bar where the terminal has room for it, characters.
 const BAR: usize = 24;
-/// A bar narrower than this says nothing.
+/// A bar narrower than this shows nothing.
 const LEAST_BAR: usize = 6;
 /// Width of a terminal that does not say its own.
 const COLUMNS: usize = 80;
@@ -55,7 +55,7 @@ impl ProgressLine {
         Self::begin(what.into(), console.live())
     }
 
-    /// One that says nothing, for libraries and tests.
+    /// One that prints nothing, for libraries and tests.
     #[must_use]
     pub fn silent() -> Self {
         Self::begin(String::new(), false)
@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_line_tells_share_and_remaining_time() {
+    fn the_line_shows_share_and_remaining_time() {
         let quarter = line("fit", 25, 100, Duration::from_secs(20), 80);
         assert_eq!(quarter, "fit  ██████░░░░░░░░░░░░░░░░░░  25 %  1 min 00 s left");
         assert!(line("fit", 0, 100, Duration::from_secs(9), 80).ends_with("  0 %"));
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_stage_counts_anew() {
+    fn a_new_stage_restarts_the_count() {
         let progress = ProgressLine::silent();
         progress.stage("first", 3);
         progress.add(3);

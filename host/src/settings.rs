@@ -105,7 +105,7 @@ pub fn files() -> Result<Vec<PathBuf>> {
 /// Reads the settings of a file for a command line.
 ///
 /// # Errors
-/// [`DataCode::FileUnreadable`]; [`HostCode::SettingsInvalid`] with the line for text that is no TOML, an option that no command has, a
+/// [`DataCode::FileUnreadable`]; [`HostCode::SettingsInvalid`] with the line for text that is not TOML, an option that no command has, a
 /// value that it cannot take.
 pub fn read(file: &Path, command: &Command) -> Result<Vec<Setting>> {
     let text = bounds::read_text(file, bounds::WRITTEN)?.map_err(|()| {
@@ -230,7 +230,7 @@ impl Reading<'_> {
             }
             _ => {
                 return Err(self
-                    .wrong(at, key, "a date or a table is no value of an option")
+                    .wrong(at, key, "a date or a table is not a value of an option")
                     .help("write a text, a number, true or a list"));
             }
         })
@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn the_command_line_goes_before_the_file_and_the_file_before_the_default() {
+    fn the_command_line_has_priority_over_the_file_and_that_over_the_default() {
         let settings = of("port = \"COM3\"\nmuscle = \"m.toml\"\n[fit]\norder = 3\n").unwrap();
         let order = |line: &[&str]| {
             let matches = apply(command(), &settings).try_get_matches_from(line).unwrap();
@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_reported_with_its_line_and_a_remedy() {
+    fn faults_are_reported_with_their_line_and_a_remedy() {
         for (text, line, said) in [
             ("\nprot = 1\n", 2, "did you mean port"),
             ("[fit]\norder = 9\n", 2, "9 is not in 1..=6"),

@@ -193,7 +193,7 @@ const WAYS: &[Spoil] = &[
     ("missing description", "file::unreadable", |_| "w,w/none.toml,w/*.csv".into()),
     ("pattern without a file", "file::unreadable", |_| "w,w/muscle.toml,w/*.parquet".into()),
     ("folder as recording", "file::unreadable", |_| "w,w/muscle.toml,w".into()),
-    ("description that is no TOML", "muscle::invalid", |w| {
+    ("description that is not TOML", "muscle::invalid", |w| {
         spoil_description(w, "rest_length_mm", "rest length mm")
     }),
     ("description with an impossible value", "muscle::invalid", |w| spoil_description(w, "39.16", "-39.16")),

@@ -6,7 +6,7 @@
 //! table that the source makes. A line `<!-- picture FILE -->` before an image says which file of that folder the image is.
 //!
 //! Did this fail after a change that was meant? Run `BOOK=overwrite cargo test -p host --test book`, and read the difference. With
-//! `BOOK_PAGE=diagnosis.md` only that page is looked at.
+//! `BOOK_PAGE=diagnosis.md` only that page is checked.
 
 #![cfg(unix)]
 

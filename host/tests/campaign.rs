@@ -57,7 +57,7 @@ fn until_rows(folder: &Path, child: &mut Child, more_than: usize) {
 }
 
 #[test]
-fn a_killed_campaign_loses_no_row_and_goes_on() {
+fn a_killed_campaign_loses_no_row_and_continues() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let mut child = campaign(folder).spawn().unwrap();
@@ -70,7 +70,7 @@ fn a_killed_campaign_loses_no_row_and_goes_on() {
     // Ctrl-C.
     let id = rustix::process::Pid::from_child(&child);
     rustix::process::kill_process(id, rustix::process::Signal::INT).unwrap();
-    assert!(child.wait().unwrap().success(), "an interruption is no failure");
+    assert!(child.wait().unwrap().success(), "an interruption is not a failure");
     let after = rows(folder);
     assert!(before.iter().all(|row| after.contains(row)), "a row is gone");
     let course: Value =
@@ -133,7 +133,7 @@ fn a_rig_that_the_virtual_bench_does_not_have_is_refused() {
     assert!(said.contains("no hanging weight"), "{said}");
 }
 
-/// Setpoints arrive too late then, and steps are recorded in vain.
+/// Setpoints arrive too late then, and steps are recorded without use.
 #[test]
 fn a_speed_that_the_program_cannot_follow_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();

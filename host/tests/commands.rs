@@ -137,7 +137,7 @@ fn two_results_do_not_share_standard_output() {
         let (status, said) = host(folder.path(), &call.split(' ').collect::<Vec<_>>(), None);
         assert!(status == 2 && said.contains("would all go to standard output"), "{call}: {status} {said}");
     }
-    // One may, and then words for people are no part of it.
+    // One may, and then words for people are not part of it.
     let output = Command::new(env!("CARGO_BIN_EXE_host"))
         .args(["effects", "backlash", "--report", "-"])
         .current_dir(folder.path())
@@ -171,7 +171,7 @@ fn there_is_a_manual_page_for_every_command() {
 }
 
 #[test]
-fn the_command_line_goes_before_the_environment_and_that_before_the_file() {
+fn the_command_line_has_priority_over_the_environment_and_that_over_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let deep = folder.path().join("a/b");
     std::fs::create_dir_all(&deep).unwrap();

@@ -207,7 +207,7 @@ fn a_run_is_a_recording_that_the_readers_of_recordings_read() {
 }
 
 #[test]
-fn a_broken_load_cell_stops_a_run_in_words_and_the_rows_until_then_are_kept() {
+fn a_broken_load_cell_stops_a_run_with_a_message_and_the_rows_until_then_are_kept() {
     let bench = Bench::start("fault");
     bench.table("mini.pam", 76.5);
     bench.done(&["flash", "mini.pam"]);
@@ -376,7 +376,7 @@ fn a_sensor_is_calibrated_with_known_values_and_a_recording_holds_its_scale() {
 
 /// `host demo` is the first thing a new user runs: every run of it must be there from its first second to its last.
 #[test]
-fn the_demo_tells_the_whole_story() {
+fn the_demo_shows_the_whole_workflow() {
     let folder = tempfile::tempdir().unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_host"))
         .args(["demo", "--on", "native", "--json", "-o"])

@@ -84,7 +84,7 @@ fn start(folder: &Path, port: &str, more: &[&str]) -> Child {
 }
 
 #[test]
-fn both_forms_hold_the_same_samples_and_say_how_they_were_made() {
+fn both_forms_hold_the_same_samples_and_their_origin() {
     let folder = tempfile::tempdir().unwrap();
     let controller = controller();
     let port = controller.address().to_string();
@@ -290,7 +290,7 @@ fn a_disk_without_room_keeps_every_row_that_fitted() {
 }
 
 #[test]
-fn a_full_disk_ends_the_files_at_a_whole_sample_and_says_so() {
+fn a_full_disk_ends_the_files_at_a_whole_sample_with_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let controller = controller();
     // A limit of the system replaces a full disk: writes beyond it fail half-way.

@@ -62,7 +62,7 @@ pub(crate) fn begin() -> Digest {
 
 /// The check sum by which host and controller know a whole image: of its last four bytes, followed by all before them.
 ///
-/// An image ends in the CRC-32 of what stands before. In that order every image would have one and the same CRC-32.
+/// An image ends in the CRC-32 of what stands before. In that order every image would have the same CRC-32.
 ///
 /// ```
 /// use model_core::check::{crc32, of_image};

@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_whole_or_not_valid_is_never_started() {
+    fn incomplete_or_invalid_firmware_is_never_started() {
         let good = slot(5, 0, true);
         let mut torn = slot(6, 0, true);
         torn.state.valid = VALID & 0xFFFF;

@@ -147,7 +147,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn what_was_written_is_read_and_fits_a_kibibyte() {
+    fn a_written_image_is_read_back_and_fits_a_kibibyte() {
         let mut buffer = [0; MAX_LEN];
         let image = write(&example(), &mut buffer).expect("it fits");
         assert_eq!(read(image), Ok(example()));

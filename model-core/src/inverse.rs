@@ -10,7 +10,7 @@ use crate::spline::{self, Cubic};
 use crate::units::{Force, Pressure};
 use serde::{Deserialize, Serialize};
 
-/// Whether the force can be had, and if not, why.
+/// Whether the force can be reached, and if not, why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reach {
     /// The pressure gives the demanded force.
@@ -278,7 +278,7 @@ impl<T: Scalar> Muscle<T> {
         }
     }
 
-    /// The search from piece to piece. It continues where the search on the first piece left it, and if that is not enough, it begins anew
+    /// The search from piece to piece. It continues where the search on the first piece left it, and if that is not enough, it restarts
     /// within a bracket.
     #[cold]
     #[inline(never)]

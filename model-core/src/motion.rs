@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slide_goes_over_like_the_exponential_and_noise_hardly_stirs_it() {
+    fn a_slide_follows_the_exponential_and_noise_hardly_disturbs_it() {
         let mut slide = Slide::<f64>::default();
         assert_eq!(slide.step(0.0), 0.0, "unknown at first");
         for _ in 0..100 {

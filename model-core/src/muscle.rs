@@ -57,7 +57,7 @@ impl<T: Scalar> Piece<T> {
 }
 
 impl<T: Scalar> Muscle<T> {
-    /// Turns a table into the form that is evaluated. Lossless but for rounding to `T`, in which all of it is computed: a controller
+    /// Turns a table into the form that is evaluated. Lossless except for rounding to `T`, in which all of it is computed: a controller
     /// has no double precision, and its software would cost more flash than all of the model's constants.
     ///
     /// # Errors

@@ -27,7 +27,7 @@ pub fn hold(muscle: &Muscle<f32>, at_stroke: &mut AtStroke<f32>, stroke: Length<
     *at_stroke = muscle.at_stroke(stroke);
 }
 
-/// Both for one tick: the shape into its place, and the force there by the coefficients of that shape. It is [`force`] but for
+/// Both for one tick: the shape into its place, and the force there by the coefficients of that shape. It is [`force`] except for
 /// rounding: the terms are added in another order.
 #[inline(never)]
 pub fn pose(

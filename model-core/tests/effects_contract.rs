@@ -112,7 +112,7 @@ fn the_whole_catalogue_is_there_under_its_names() {
 }
 
 #[test]
-fn what_each_says_of_itself_holds_together() {
+fn the_description_of_each_effect_is_consistent() {
     for effect in EffectName::ALL {
         let info = effect.info();
         let shapes = info.parameters.len() - info.amplitudes();

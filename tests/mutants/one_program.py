@@ -1,6 +1,6 @@
 """All changes of cargo-mutants compiled into one program. A variable of the environment selects the one that is in force.
 
-Building the tests anew for each of a thousand changes takes hours. Here every function that has changes gets a copy of its body for each:
+Building the tests again for each of a thousand changes takes hours. Here every function that has changes gets a copy of its body for each:
 
     fn halved(x: f32) -> f32 { match crate::change_in_force() { 1 => { x * 2.0 } 2 => { x % 2.0 } _ => { x / 2.0 } } }
 
@@ -37,7 +37,7 @@ PATIENCE_S = 60
 BUILD_PATIENCE_S = 600
 # Parts of the names of tests that take seconds, by their module. They run last, on changes of their module that the others do not notice.
 LATE = {"health": ["correlated_noise"], "watch": ["watch::tests::calm"], "store": ["loses_power", "lose_power"]}
-# What is no code: comments, strings, characters (but no lifetimes).
+# What is not code: comments, strings, characters (but no lifetimes).
 NO_CODE = re.compile(r"//[^\n]*|/\*.*?\*/|r(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\[^\n]*?|[^'\\\n])'", re.DOTALL)
 INLINE = re.compile(r"#\[inline(\((always|never)\))?\]")
 

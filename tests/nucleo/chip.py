@@ -32,7 +32,7 @@ NMI, HARD_FAULT = -14, -13
 
 
 class Chip:
-    """A board: its flash and RAM outlive restarts, everything else begins anew with each."""
+    """A board: its flash and RAM outlive restarts, everything else restarts with each."""
 
     def __init__(self, image, cycles=1.0):
         self.cycles = cycles
@@ -125,7 +125,7 @@ class Chip:
             heapq.heappop(self.events)[2]()
 
     def restart(self, why, flags):
-        """The chip is reset; it starts anew before the next instruction."""
+        """The chip is reset; it restarts before the next instruction."""
         self._restart = (why, flags)
         self.uc.emu_stop()
 

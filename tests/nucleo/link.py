@@ -101,7 +101,7 @@ class Refused(Exception):
 
 
 class SerialLine:
-    """The chip's serial line; it begins anew with each restart."""
+    """The chip's serial line; it is new after each restart."""
 
     def __init__(self, chip):
         self.chip = chip

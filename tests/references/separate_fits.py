@@ -3,7 +3,7 @@
 
 Writes `separate_fits_points.csv` (mid-line points of a muscle whose wall is a hyperelastic tube, differentiated numerically)
 and `separate_fits.csv` (E_1..E_4 in MPa by numpy.linalg.lstsq on scaled columns, and the largest residual in N).
-`host/tests/fit_references.rs` compares. Nothing here is shared with the program: kinematics are written out anew.
+`host/tests/fit_references.rs` compares. Nothing here is shared with the program: kinematics are written out again.
 
 Run: python3 tests/references/separate_fits.py        (numpy, SciPy)
 """

@@ -13,7 +13,7 @@ the development half: most classes right among those settings that name at most 
   emdcmp      each change against no change by the empirical model discrepancy (Bemd): the change of least held-out risk, where its
               probability of less risk than no change is large enough; slow, so on a share of the pairs (--emd)
   boosting    scikit-learn's gradient boosting on features of the cells, trained on the pairs of simulated muscles (DIR/training.jsonl)
-  lisdd       localise, name, certify (arXiv 2606.23215, after its abstract: the text of the algorithm was not to be had): regions whose
+  lisdd       localise, name, certify (arXiv 2606.23215, after its abstract: the text of the algorithm was not available): regions whose
               energy of the residual is beyond the spread before, the term by exhaustive hold-out within them, a sample-split F-test
 """
 
@@ -112,7 +112,7 @@ def lisdd(pair, level, significance):
     other; certify: F-test on the half that did not choose the term."""
     one, two = pair.split
     places = regions(pair)
-    # The clean regime: where the difference is no larger than the spread. A shift common to it is no discrepancy of the others.
+    # The clean regime: where the difference is no larger than the spread. A shift common to it is not a discrepancy of the others.
     clean = [i for i in places.values() if np.mean(one[i] ** 2) < scipy.stats.chi2.ppf(level, len(i)) / len(i)]
     flagged = [i for i in places.values() if not np.mean(one[i] ** 2) < scipy.stats.chi2.ppf(level, len(i)) / len(i)]
     if not flagged:

@@ -325,7 +325,7 @@ fn main() -> ! {
     };
     EXECUTOR.init_with(Executor::new).run(|spawner| {
         if spawn(spawner, &start).is_none() {
-            // Without a store there is no one to tell; the board stays vented, and the watchdog tries again.
+            // Without a store no one can be informed; the board stays vented, and the watchdog tries again.
             dump();
         }
     })

@@ -150,7 +150,7 @@ impl Actuator {
         });
     }
 
-    /// The air in the muscle, as far as a table tells.
+    /// The air in the muscle, as far as a table gives it.
     pub(super) fn air(&self) -> Air {
         self.present().map_or_else(Air::default, |model| model.air(self.motion.motion().speed))
     }

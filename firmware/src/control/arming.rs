@@ -1,4 +1,4 @@
-//! Arming: only an empty muscle is armed, and where the settings ask for it only behind a dump valve that has been tried.
+//! Arming: only an empty muscle is armed, and where the settings require it only behind a dump valve that has been tried.
 //!
 //! ```text
 //! filling    dump valve closed, regulator at the test's pressure     until the pressure stands, above half of it and below twice

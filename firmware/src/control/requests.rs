@@ -152,7 +152,7 @@ impl Controller {
 
     pub(super) fn vent_now(&mut self) {
         self.arming = Arming::Idle;
-        // In `Fault` with a held command this is the way to let go of it.
+        // In `Fault` with a held command this is the way to release it.
         for side in &mut self.sides {
             side.command = Command::VENT;
         }

@@ -132,7 +132,7 @@ impl Bench {
 }
 
 #[test]
-fn what_vents_ends_a_hold_and_what_may_be_held_for_does_not_hide_it() {
+fn a_fault_that_vents_ends_a_hold_and_a_held_fault_does_not_hide_it() {
     type Change = fn(&mut Readings, &mut Inputs);
     let cases: [(Fault, Change); 4] = [
         (Fault::OverPressure, |now, _| now.pressure_pa = 900e3),

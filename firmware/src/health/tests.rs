@@ -119,7 +119,7 @@ fn correlated_noise_raises_less_than_one_alarm_in_a_hundred_hours() {
     let (found, naive) = alarms(hours);
     println!("{found} of {hours} hours with an alarm; {naive} if each sample were independent");
     assert_eq!(found, 0);
-    assert!(naive > 0, "the noise would not deceive a test that counts samples either");
+    assert!(naive > 0, "the noise would not mislead a test that counts samples either");
 }
 
 #[test]

@@ -32,9 +32,9 @@ impl Integral {
 /// Trim of force on the load cell, Pa. `saturation` is the sign of what the last command's limits took away.
 ///
 /// Without a table the error is that of the demanded force, and the loop `L(s) = g (K_p + K_i/s)` with `g = ∂F/∂P` crosses over
-/// near `g K_i` rad/s; the regulator's lag asks for a good deal less than `1/lag`. With one it is that of the force which the
+/// near `g K_i` rad/s; the regulator's lag requires much less than `1/lag`. With one it is that of the force which the
 /// table gives at the measured pressure, less what the trim has added: an observer of what the table leaves out. The
-/// regulator's lag is not in that loop, which has to wait for nothing but its own filter of `g K_i` rad/s, and the trim does not
+/// regulator's lag is not in that loop, which has to wait only for its own filter of `g K_i` rad/s, and the trim does not
 /// answer a wave with a wave of its own.
 pub fn trim(force_loop: &ForceLoop, integral: &mut Integral, error_n: f32, saturation: f32) -> f32 {
     let limit = force_loop.trim_limit_pa;

@@ -30,7 +30,7 @@ impl Default for Wear {
 impl Wear {
     /// Whether one write is allowed at a tick; it is then counted.
     pub(super) fn allows(&mut self, tick: u64) -> bool {
-        // Ticks begin anew with a controller that was restarted.
+        // Ticks restart with a controller that was restarted.
         let ticks = tick.saturating_sub(self.refilled).min(u64::from(u32::MAX)) as u32;
         let passed = ticks / REFILL_TICKS;
         if passed > 0 || tick < self.refilled {
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_that_begin_anew_do_not_take_the_allowance_away() {
+    fn ticks_that_restart_do_not_remove_the_allowance() {
         let minutes = |count: u64| count * u64::from(REFILL_TICKS);
         let mut wear = Wear::default();
         let used = minutes(1_000);

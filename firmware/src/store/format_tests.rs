@@ -61,7 +61,7 @@ fn flash_of(text: &str) -> MockFlash {
 /// If this test breaks, something that is kept has other fields: raise [`FORMAT`] and the key of what changed, run the test once with
 /// `STORE=overwrite`, which writes `format-N.txt` of the new number, and keep the files of the numbers before for the test below.
 #[test]
-fn what_this_format_wrote_is_read_and_written_alike() {
+fn stored_data_of_this_format_are_read_and_written_alike() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("src/store/fixtures")
         .join(std::format!("format-{FORMAT}.txt"));

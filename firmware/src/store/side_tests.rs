@@ -119,7 +119,7 @@ fn a_next_place_beyond_the_log_is_brought_back_into_it() {
 }
 
 #[test]
-fn a_layout_whose_settings_are_gone_is_not_taken_for_a_new_device() {
+fn a_layout_with_missing_settings_is_not_treated_as_a_new_device() {
     for layout in [1, FORMAT - 1, FORMAT, FORMAT + 1] {
         let mut store = open(MockFlash::erased());
         store.put_value(0x3F, &mut { layout }).expect("room");

@@ -39,7 +39,7 @@ pub(super) fn used(commits: u8) -> Store<MockFlash> {
     store
 }
 
-/// Runs an operation with the power cut at every one of its writes and erases, each torn in three ways; looks at what is
+/// Runs an operation with the power cut at every one of its writes and erases, each interrupted in three ways; looks at what is
 /// there after the power came back. Gives how many cuts were tried.
 pub(super) fn cut_everywhere(
     before: &MockFlash,
@@ -161,7 +161,7 @@ fn settings_confirmed_after_damage_that_lose_power_are_new_or_not_trusted() {
 }
 
 #[test]
-fn rolling_back_returns_and_there_and_back_again() {
+fn a_rollback_returns_to_the_table_before_and_a_second_one_back() {
     let mut store = open(MockFlash::erased());
     assert_eq!(store.roll_back(Side::Agonist, 0), Err(StoreFault::NoPrevious));
     store.commit(Side::Agonist, &table(1)).expect("room");

@@ -173,7 +173,7 @@ fn another_firmware_is_installed_tried_and_confirmed() {
 }
 
 #[test]
-fn a_firmware_that_nobody_confirms_is_replaced_by_the_one_before() {
+fn an_unconfirmed_firmware_is_replaced_by_the_one_before() {
     let mut now = updater(device());
     assert_eq!(install(&mut now, &image(1, 2, 6000)), Ok(()));
     let mut mock = now.slots;
@@ -276,7 +276,7 @@ fn a_program_that_is_not_the_signed_one_is_never_valid() {
 }
 
 #[test]
-fn pieces_whose_answers_are_lost_come_again_and_gaps_are_named() {
+fn pieces_with_lost_answers_are_repeated_and_gaps_are_named() {
     let mut now = updater(device());
     let (header, program) = image(1, 2, 3999);
     assert_eq!(now.begin(&header.to_bytes()), Ok(()));

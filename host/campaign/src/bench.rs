@@ -20,7 +20,7 @@ pub struct VirtualBench {
     stroke: f64,
 }
 
-/// Samples between two looks at the force while a motion may end early.
+/// Samples between two checks of the force while a motion may end early.
 const LOOK: f64 = 3.0;
 
 impl VirtualBench {

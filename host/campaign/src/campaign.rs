@@ -21,7 +21,7 @@ use crate::journal::{Chosen, Completion, Event, Journal, unix_seconds};
 use crate::step::Step;
 use crate::watch::{Limits, Spoiled, Watch};
 
-/// One step of the course, as it went.
+/// One step of the course, as it was carried out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Done {
     /// Why it was chosen.

@@ -13,7 +13,7 @@ pub const BOTTOM_DEADBANDS: f64 = 1.8;
 pub const BOTTOM_STROKE: f64 = 0.125;
 /// Recordings from which on a table is fitted: zeros, blocked force, and one stroke or staircase.
 pub const FIT_FROM: usize = 3;
-/// Pressure levels that a campaign plans with: six is what the book's page on campaigns asks for.
+/// Pressure levels that a campaign plans with: six is what the book's page on campaigns requires.
 pub const LEVELS: usize = 6;
 /// Seconds for the free stroke at the slow speed (the thesis: 1 mm/s for a 150 mm muscle).
 pub const SLOW_STROKE: f64 = 27.0;

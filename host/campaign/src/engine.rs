@@ -54,7 +54,7 @@ pub struct Engine {
     diagnosis: Option<Diagnosis>,
     since_diagnosis: usize,
     error: Option<f64>,
-    /// Time that an operator needs for each step besides its own, s; none where the program carries it out.
+    /// Time that an operator needs for each step in addition to its own, s; none where the program carries it out.
     handling_s: f64,
 }
 

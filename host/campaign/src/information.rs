@@ -1,4 +1,4 @@
-//! What a step is expected to tell, per second: about the table, about which effect it is, and about effects that nothing has shown yet.
+//! The information that a step is expected to give, per second: about the table, about which effect it is, and about effects that nothing has shown yet.
 //!
 //! ```text
 //! table    Σ ½ ln((s² + δ²)/(s₁² + δ²))      s²: predicted variance of the force on unseen pressures and strokes, before and after
@@ -51,7 +51,7 @@ pub struct Knowledge<'a> {
     pub checked: &'a [checks::Kind],
 }
 
-/// What a step is expected to tell, nats.
+/// The information that a step is expected to give, nats.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gain {
     /// About the table.
@@ -140,7 +140,7 @@ impl<'a> Design<'a> {
         matrix.tr_mul(&matrix)
     }
 
-    /// What a step is expected to tell.
+    /// The information that a step is expected to give.
     #[must_use]
     pub fn gain(&self, step: &Step, places: &Places) -> Gain {
         if let Step::Check { check } = step {

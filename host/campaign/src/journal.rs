@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_step_loses_no_whole_row_and_the_log_goes_on() {
+    fn an_interrupted_step_loses_no_whole_row_and_the_log_continues() {
         let folder = tempfile::tempdir().unwrap();
         let mut journal = Journal::open(folder.path()).unwrap();
         journal.begin(1, "tare").unwrap();

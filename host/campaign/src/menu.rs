@@ -41,7 +41,7 @@ pub fn menu(places: &Places, rig: &Rig) -> Vec<Step> {
     steps
 }
 
-/// The first steps of a campaign with the reason of each: before there is a table, nothing can be weighed.
+/// The first steps of a campaign with the reason of each: before there is a table, nothing can be ranked.
 #[must_use]
 pub fn opening(rig: &Rig) -> Vec<(Step, &'static str)> {
     let mut steps = vec![

@@ -25,7 +25,7 @@ impl<W> std::fmt::Debug for Prompt<W> {
     }
 }
 
-/// Time between two looks at Ctrl-C while the operator is awaited.
+/// Time between two checks of Ctrl-C while the program waits for the operator.
 const LOOK: Duration = Duration::from_millis(50);
 /// Strokes closer than this are the same, m: a hundredth of a millimetre is finer than an operator sets one.
 const SAME: f64 = 1e-5;
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_person_is_asked_once_for_each_stroke() {
+    fn an_operator_is_prompted_once_for_each_stroke() {
         let mut output = Vec::new();
         let mut prompt = Prompt::new(std::io::Cursor::new("\n\n"), &mut output, Arc::default());
         for stroke in [0.0, 12.5e-3, 12.5e-3, 0.0] {

@@ -39,7 +39,7 @@ impl Axis {
         matches!(self, Self::Line | Self::Commanded)
     }
 
-    /// Whether other held lengths than the present one can be had.
+    /// Whether other held lengths than the present one are possible.
     #[must_use]
     pub const fn positions(self) -> bool {
         matches!(self, Self::Prompt | Self::Line | Self::Commanded)
@@ -89,7 +89,7 @@ impl Rig {
     /// Reads a rig file.
     ///
     /// # Errors
-    /// A file that cannot be read, or that is no description of a rig.
+    /// A file that cannot be read, or that is not a description of a rig.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::unreadable(path, &e))?;
         Self::parse(&text).map_err(|e| e.file(path))

@@ -118,7 +118,7 @@ impl Line {
     }
 
     fn order(&mut self, line: &str) -> Result<()> {
-        // What the machine said without being asked is no answer to this.
+        // What the machine said without being asked is not an answer to this.
         self.received.clear();
         self.port.write_all(format!("{line}\n").as_bytes()).map_err(|e| lost(&e))?;
         let answer = self.answer()?;

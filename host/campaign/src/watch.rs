@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn danger_is_reported_at_once() {
+    fn danger_is_reported_immediately() {
         let mut watch = Watch::new(LIMITS, 6e5, 100.0);
         let well = Reading { pressure: 1e5, command: 1e5, ..Reading::default() };
         assert_eq!(watch.add(&well), None);

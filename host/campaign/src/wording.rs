@@ -14,7 +14,7 @@ pub const NO_TABLE: &str =
     "The recordings do not determine a table yet, so the steps of the menu are made in their order.";
 /// Why a campaign ends although not everything is known.
 pub const NOTHING_MORE: &str =
-    "No step that this rig can do within the time left is expected to tell anything more.";
+    "No step that this rig can do within the time left is expected to give more information.";
 
 /// Why a plan ends before there is a table.
 pub const PLAN_AGAIN: &str =
@@ -26,7 +26,7 @@ pub fn plan_is_full(steps: usize) -> String {
     format!("The plan has the requested number of steps, {steps}.")
 }
 
-/// Why a step was chosen, with what it is expected to tell, in one sentence.
+/// Why a step was chosen, with its expected information, in one sentence.
 #[must_use]
 pub fn why_with_gain(why: &str, gain: &Gain) -> String {
     format!(

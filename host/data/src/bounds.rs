@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_ends_where_it_says() {
+    fn a_budget_ends_at_its_limit() {
         let mut budget = Budget::new(5);
         assert!(budget.take(5).is_ok() && budget.take(0).is_ok() && budget.take(1).is_err());
         assert!(Budget::default().take(usize::MAX).is_err());

@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_date_in_a_name_goes_there_and_back() {
+    fn a_date_in_a_name_is_read_and_written_back() {
         for seconds in [951_782_400_u64, 1_795_219_200, 1_709_164_800] {
             let text = iso_8601(seconds);
             assert_eq!(in_text(&format!("run_{text}_a")), Some(seconds as f64), "{text}");

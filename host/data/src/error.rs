@@ -174,10 +174,10 @@ error_codes! {
             "compare with the tables in the book's chapter on checking the bench";
         /// A table file is damaged or from another version.
         TableInvalid = "table::invalid", Input,
-            "fit the muscle anew with `host fit`";
+            "fit the muscle again with `host fit`";
         /// A protocol is not valid, or cannot be carried out.
         ProtocolInvalid = "protocol::invalid", Input,
-            "`virtual-bench record` writes a protocol beside its recordings, `host diagnose --next` one that would tell more";
+            "`virtual-bench record` writes a protocol beside its recordings, `host diagnose --next` one that would show more";
         /// Options that contradict each other or are out of range.
         CallInvalid = "call::invalid", Call,
             "--help behind the command shows what it takes, with examples";
@@ -402,7 +402,7 @@ impl miette::Diagnostic for Error {
 /// assert_eq!(pam_data::error::nearest("fti", ["run", "fit"]), Some("fit"));
 /// ```
 pub fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // Names are short; anything longer is no misspelling of one of ours.
+    // Names are short; anything longer is not a misspelling of one of ours.
     let wanted = wanted.chars().take(64).collect::<String>().to_lowercase();
     candidates
         .into_iter()

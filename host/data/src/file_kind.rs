@@ -131,7 +131,7 @@ impl FileKind {
     /// The text of a file of this kind.
     ///
     /// # Errors
-    /// [`DataCode::FileUnreadable`]; the kind's own failure for a file that is no text.
+    /// [`DataCode::FileUnreadable`]; the kind's own failure for a file that is not text.
     pub fn read_text(self, path: &Path) -> Result<String> {
         bounds::read_text(path, bounds::WRITTEN)?
             .map_err(|()| self.wanted(path, Error::new(self.code(), "the file is binary, not text")))
@@ -155,7 +155,7 @@ mod tests {
             (b"PAMF\x01\x00", Some(FileKind::Table)),
             (b"{\n  \"schema\": \"pam-fit/1\",\n", Some(FileKind::Json)),
             (b"hello\n", None),
-            // A character that is cut in two at the end of what was looked at is no reason to call it binary.
+            // A character that is cut in two at the end of what was read is not a reason to call it binary.
             (b"time_s;force_N\n1;2\n\xc3", Some(FileKind::Recording)),
         ];
         for (bytes, kind) in cases {

@@ -61,7 +61,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     named.persist(path).map(drop).map_err(|e| unwritable(e.error))
 }
 
-/// Writes to standard output. A reader that stopped reading (`| head`) is no failure; a full disk is.
+/// Writes to standard output. A reader that stopped reading (`| head`) is not a failure; a full disk is.
 ///
 /// # Errors
 /// [`DataCode::FileUnwritable`].

@@ -61,7 +61,7 @@ mod tests {
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
-    #[allow(dead_code)] // only the parser's complaints are looked at
+    #[allow(dead_code)] // only the parser's complaints are read
     struct Example {
         length_mm: f64,
         name: String,

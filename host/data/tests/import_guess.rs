@@ -99,7 +99,7 @@ fn a_pressure_of_the_name_or_of_the_lines_above_is_taken() {
 }
 
 #[test]
-fn runs_in_one_file_are_set_apart_where_time_begins_again() {
+fn runs_in_one_file_are_separated_where_time_restarts() {
     let mut text = "condition,trial,phase,t_s,p_kPa,length_mm,force_N,force_sd_N\n".to_owned();
     for (condition, length) in [("long", 120), ("short", 110)] {
         for trial in 1..=3 {
@@ -123,7 +123,7 @@ fn runs_in_one_file_are_set_apart_where_time_begins_again() {
 }
 
 #[test]
-fn what_cannot_be_known_is_left_out_and_listed() {
+fn unknown_columns_are_left_out_and_listed() {
     let text = format!(
         "time_s,pressure_kPa,stroke_mm,load [V]\n{}",
         rows(|[t, p, x, f]| format!("{t},{},{x},{}", 100.0 * p, f / 50.0))
@@ -155,7 +155,7 @@ fn data(file: &str) -> Option<PathBuf> {
 
 /// Descriptions that a user wrote of the same files are the reference.
 #[test]
-fn real_recordings_are_read_as_by_the_description_of_a_person() {
+fn real_recordings_are_read_as_by_a_handwritten_description() {
     let cases = [
         ("aarl-festo-10mm-2022/festo10_cut150mm.csv", "festo-2022-staircase", 0.132),
         ("aarl-festo-10mm-2021/festo10_rest120mm_13cm.csv", "festo-2021-staircase", 0.12),

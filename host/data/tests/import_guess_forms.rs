@@ -227,13 +227,13 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
         "{:?}",
         guess.checks
     );
-    // One file at one pressure says nothing of either.
+    // One file at one pressure shows neither.
     let (_, recordings) = read(&[("a.csv", file(200.0))]);
     assert_eq!((recordings.unwrap()[0].pressure[0] * 1e-3).round(), 700.0);
 }
 
 #[test]
-fn what_a_file_lacks_is_reported_with_the_right_remedy() {
+fn missing_data_are_reported_with_the_right_remedy() {
     let unknown = |text: String| read(&[("a_300kPa.csv", text.into())]).0.all_unknown();
     let head = "time_s,pressure_kPa,displacement_mm,force_N\n";
     // Two sensors in rows of their own: leaving out incomplete rows leaves none.
@@ -245,7 +245,7 @@ fn what_a_file_lacks_is_reported_with_the_right_remedy() {
         format!("{},{p},{x:.3},{f:.3}", (4_294_000_000 + (t * 1e6) as u64) % (1 << 32))
     });
     let wraps = unknown(format!("micros,pressure_kPa,displacement_mm,force_N\n{rows}"));
-    assert!(wraps.contains("a counter of 32 bits began again behind row 20"), "{wraps}");
+    assert!(wraps.contains("a counter of 32 bits overflowed after row 20"), "{wraps}");
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},{x:.3},{f:.3},{:.2},{p},{x:.3},{f:.3}", t + 0.3));
     let two = format!("Time_1,Press_1,Ext_1,Load_1,Time_2,Press_2,Ext_2,Load_2\n{rows}");
     assert_eq!(read(&[("a.csv", two.into())]).0.side_by_side, Some((2, 4)));
@@ -264,7 +264,7 @@ fn a_rest_length_that_is_held_within_the_noise_of_a_sensor_is_no_stroke() {
 }
 
 #[test]
-fn units_that_no_name_says_are_those_that_suit_all_files() {
+fn units_without_a_name_are_taken_from_all_files() {
     let file = |bar: f64, mm: f64| {
         let rows = stroke(|[t, _, x, f]| format!("{t:.2},{bar},{:.4},{f:.3}", 0.25 * x * mm));
         format!("time,pressure,stroke,force\n{rows}").into_bytes()

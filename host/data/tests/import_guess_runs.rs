@@ -65,7 +65,7 @@ fn a_moved_length_with_a_zero_of_its_own_counts_from_the_greatest_length() {
 }
 
 #[test]
-fn a_column_that_numbers_runs_sets_them_apart_where_the_clock_goes_on() {
+fn a_column_that_numbers_runs_separates_them_where_the_clock_continues() {
     let runs = [(0.0, "1"), (7.5, "1"), (0.0, "2"), (7.5, "2")];
     let text = runs.iter().enumerate().fold(format!("run,mounting,{HEADER}"), |text, (i, (mm, run))| {
         text + &staircase(60 * i as i32, *mm, &format!("{run},{mm},"))
@@ -76,7 +76,7 @@ fn a_column_that_numbers_runs_sets_them_apart_where_the_clock_goes_on() {
 }
 
 #[test]
-fn a_column_that_comes_back_to_earlier_values_sets_nothing_apart() {
+fn a_column_that_returns_to_earlier_values_separates_no_runs() {
     let text = (0..8).fold(format!("set,{HEADER}"), |text, i| {
         text + &staircase(60 * i, 0.0, if i % 2 == 0 { "a," } else { "b," })
     });
@@ -95,7 +95,7 @@ fn a_held_length_is_taken_from_the_names_of_the_files() {
     ]);
     assert!(guess.unknown.is_empty(), "{:?}", guess.unknown);
     assert_eq!(strokes_mm(&recordings), [18.0, 40.5, 25.5], "{}", guess.description);
-    // A diameter alone is no length.
+    // A diameter alone is not a length.
     let unknown = |names: [&str; 2]| {
         let folder = tempfile::tempdir().unwrap();
         let paths = names.map(|name| folder.path().join(name));

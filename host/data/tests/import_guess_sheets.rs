@@ -29,7 +29,7 @@ fn recordings(text: &str) -> (Guess, Vec<Recording>) {
 const ROWS: u32 = 40;
 const HEADER: &str = "time_s,pressure_kPa,displacement_mm,force_N\n";
 
-/// Rows of a slow stroke: s, kPa, mm, N. The pressure has noise, so that it is no label.
+/// Rows of a slow stroke: s, kPa, mm, N. The pressure has noise, so that it is not a label.
 fn rows(begin_s: f64, kpa: f64) -> Vec<[f64; 4]> {
     (0..ROWS)
         .map(|i| {
@@ -75,7 +75,7 @@ fn a_clock_that_begins_again_begins_a_recording() {
     same(&read[1], 300.0);
     same(&read[2], 500.0);
     assert!(guess.checks.iter().any(|c| c.text().contains("begins again at 2 rows")), "{:?}", guess.checks);
-    // Rows that are there twice, or a clock that jumps back a little, are no runs.
+    // Rows that are there twice, or a clock that jumps back a little, are not runs.
     let twice = format!("{HEADER}{}{}", run(300.0), lines(&rows(1.95, 300.0), plain));
     assert!(self::read(&twice).1.is_err());
     let back = format!("{HEADER}{}{}", run(300.0), lines(&rows(1.5, 300.0), plain));
@@ -94,7 +94,7 @@ fn with_mark(seconds: f64) -> String {
 }
 
 #[test]
-fn a_time_of_day_that_passes_midnight_goes_on() {
+fn a_time_of_day_continues_past_midnight() {
     let header = "time,pressure_kPa,displacement_mm,force_N\n";
     for stamp in [time_of_day, with_mark] {
         let text = lines(&rows(86_399.0, 300.0), |[t, p, x, f]| format!("{},{p},{x},{f}", stamp(t)));
@@ -210,7 +210,7 @@ fn separators_of_thousands_are_read_where_they_are_known() {
         std::fs::write(file.path(), format!("{names}\n{text}")).unwrap();
         same(&Reader::new().import(Some(&import)).file(file.path()).unwrap()[0], 300.0);
     }
-    // Groups of two digits are no thousands.
+    // Groups of two digits are not thousands.
     let import = Import::parse("delimiter = \"semicolon\"\nthousands = \",\"\n").unwrap();
     let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
     let text = lines(&rows(0.0, 300.0), |[t, _, x, f]| format!("{t:.2};3,00;{x:.3};{f:.3}"));

@@ -147,7 +147,7 @@ fn a_pause_of_a_topic_is_not_filled_in() {
     assert_eq!(error.place().column.as_deref(), Some("x.mm"));
     let read = read_json(&rows, &format!("missing = \"skip\"\n{JSON}")).unwrap();
     assert_eq!((read[0].len(), read[0].skipped), (51, 36), "{:?}", read[0].time);
-    // Three lost messages are no pause.
+    // Three lost messages are not a pause.
     assert_eq!(read_json(&two_rates(|ms| (400..490).contains(&ms)), JSON).unwrap()[0].len(), 87);
 }
 

@@ -44,7 +44,7 @@ pub enum Address {
     },
 }
 
-/// Where nothing else is said: the bit rate of a new device, and a speed that most adapters have that are not on USB.
+/// The default: the bit rate of a new device, and a speed that most adapters have that are not on USB.
 const KBIT_PER_S: u16 = CanLine::OFF.kbit_per_s;
 const BAUD: u32 = 115_200;
 
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_printed_is_read_again() {
+    fn printed_addresses_are_read_again() {
         for text in [
             "/dev/ttyUSB0",
             "COM3",

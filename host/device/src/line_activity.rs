@@ -8,7 +8,7 @@ use crate::error::DeviceCode;
 use pam_data::error::Error;
 use pam_data::pluralise::pluralise;
 
-/// What came before any hello, to tell a silent line from a other peer.
+/// What came before any hello, to distinguish a silent line from a other peer.
 #[derive(Default)]
 pub(super) struct LineActivity {
     /// Everything that arrived.

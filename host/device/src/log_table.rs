@@ -83,7 +83,7 @@ impl LogTable {
     /// Reads an image's log lines.
     ///
     /// # Errors
-    /// [`DataCode::FileUnreadable`] for a file that is no image, or one without logs.
+    /// [`DataCode::FileUnreadable`] for a file that is not an image, or one without logs.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = pam_data::bounds::read(path, pam_data::bounds::WHOLE)?;
         Self::parse(&bytes).map_err(|why| {
@@ -105,9 +105,9 @@ impl LogTable {
     /// The log lines of an image.
     ///
     /// # Errors
-    /// Why the bytes are no image, or one without logs.
+    /// Why the bytes are not an image, or one without logs.
     pub fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let elf = object::File::parse(bytes).map_err(|e| format!("this is no ELF image: {e}"))?;
+        let elf = object::File::parse(bytes).map_err(|e| format!("this is not an ELF image: {e}"))?;
         let section = elf.section_by_name(".defmt").ok_or("the image was built without logs")?.index();
         let (mut entries, mut timestamp) = (BTreeMap::new(), None);
         for symbol in elf.symbols() {
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_come_out_in_words_and_foreign_frames_are_refused() {
+    fn log_lines_are_decoded_and_other_frames_are_refused() {
         let mut frame = vec![1, 0, 7, 0, 0, 0, 12];
         frame.extend(1_000_u64.to_le_bytes());
         let line = table().decode(&frame).unwrap();
@@ -284,6 +284,6 @@ mod tests {
         }
         frame.push(0);
         assert!(table().decode(&frame).is_err(), "bytes too many");
-        assert!(LogTable::parse(b"no image").unwrap_err().contains("no ELF"));
+        assert!(LogTable::parse(b"no image").unwrap_err().contains("not an ELF"));
     }
 }

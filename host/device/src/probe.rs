@@ -17,7 +17,7 @@ use pam_data::error::{DataCode, Error, Result};
 pub fn program(firmware: &Path, chip: &str, console: &Console) -> Result<()> {
     let image = pam_data::bounds::read(firmware, pam_data::bounds::WHOLE)?;
     if !image.starts_with(b"\x7fELF") {
-        return Err(Error::new(DataCode::FileUnreadable, "this is no ELF file")
+        return Err(Error::new(DataCode::FileUnreadable, "this is not an ELF file")
             .file(firmware)
             .help("build one with firmware/build BOARD; it lies in target/firmware/BOARD.elf"));
     }

@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_muscle_cannot_do_is_known_before_it_moves() {
+    fn unreachable_setpoints_are_found_before_the_muscle_moves() {
         let reach = of_example();
         let constant = |value| SetpointProfile::Constant(value);
         let said = reach.beyond(Quantity::Pressure, &constant(9000e3)).expect("beyond");

@@ -175,7 +175,7 @@ pub fn from_samples(samples: &[(f64, f64, f64)]) -> Option<Found> {
     if steepest <= 0.0 {
         return None;
     }
-    // No limit lies above what was seen, but for the sensor's noise; above that all fits are the same.
+    // No limit lies above what was seen, except for the sensor's noise; above that all fits are the same.
     let (limit, limited_misfit) = golden(0.2 * steepest, 1.1 * steepest, |rate| lags_with(rate).2);
     // A limit is believed where it explains what the lag alone does not.
     let rate_limited = limited_misfit < 0.95 * free_misfit;

@@ -88,7 +88,7 @@ pub fn run(
     run_asking(client, plan, sample, stop, |_| None)
 }
 
-/// The same; besides, `next` is queried after each sample, with the time since the start in s, whether another value is demanded from
+/// The same; `next` is queried after each sample, with the time since the start in s, whether another value is demanded from
 /// now on.
 ///
 /// # Errors

@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn wrong_profiles_are_refused_with_the_reason() {
         let error = |t| SetpointProfile::parse(t, Quantity::Force).unwrap_err().to_string();
         assert!(error("sinus mean=1").contains("did you mean sine?"));
         assert!(error("sine mean=1 amplitude=2").contains("needs frequency="));

@@ -21,7 +21,7 @@ const REFUSED: u8 = 7;
 const LONGEST: usize = 160;
 /// Digits of a received message's time.
 const TIME: usize = 4;
-/// How lines begin that an adapter may send and that say nothing here.
+/// How lines begin that an adapter may send and that have no meaning here.
 const PASSED_OVER: &[u8] = b"TrRdDbBFVvNnZzALE";
 
 /// What an adapter has said.
@@ -33,7 +33,7 @@ pub enum Received {
     Done,
     /// The last line is refused.
     Refused,
-    /// Something that says nothing here.
+    /// Something without a meaning here.
     PassedOver,
     /// Nothing that an adapter says.
     Foreign,
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_adapter_says_besides_is_distinguished() {
+    fn other_lines_of_an_adapter_are_distinguished() {
         let said = all(b"\rz\r\x07V1013\rT000000801AA\rt10\x07t2011FF\n\r");
         let message = Received::Message(0x201, vec![0xFF]);
         assert_eq!(

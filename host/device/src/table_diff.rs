@@ -141,7 +141,7 @@ mod tests {
     use model_core::table::example;
 
     #[test]
-    fn only_what_differs_is_listed_and_the_force_tells_how_much_it_matters() {
+    fn only_differences_are_listed_with_their_effect_on_the_force() {
         assert!(between(&example(), &example()).is_empty());
         let mut other = example();
         other.deadband = Pressure::from_kilopascals(86.5);

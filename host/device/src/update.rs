@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_of_a_slot_is_refused() {
+    fn files_that_are_not_images_of_a_slot_are_refused() {
         assert!(program_of(b"no ELF").is_err());
         let mut elf = std::fs::read(std::env::current_exe().unwrap()).unwrap();
         elf.truncate(1 << 20);

@@ -27,7 +27,7 @@ fn image() -> Vec<u8> {
 }
 
 #[test]
-fn a_port_that_nobody_serves_is_distinguished_from_a_silent_one() {
+fn a_port_without_a_server_is_distinguished_from_a_silent_one() {
     // The port multiplexer's, which no one has served for decades and no test can be given.
     let error = connect(&Address::Tcp { host: "127.0.0.1".into(), port: 1 }).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DevicePort);
@@ -40,7 +40,7 @@ fn a_port_that_nobody_serves_is_distinguished_from_a_silent_one() {
 }
 
 #[test]
-fn a_peer_that_is_not_our_firmware_is_named_in_words() {
+fn a_peer_that_is_not_our_firmware_is_named() {
     let error = connect(&common::tcp(Vice::Chatter)).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DeviceForeign);
     assert!(error.cause().contains("not a controller of this project"), "{error}");
@@ -51,7 +51,7 @@ fn a_peer_that_is_not_our_firmware_is_named_in_words() {
 }
 
 #[test]
-fn another_schema_is_refused_and_both_versions_named_but_the_device_can_be_asked_what_it_is() {
+fn another_schema_is_refused_with_both_versions_but_the_device_can_be_identified() {
     let address = common::tcp(Vice::OtherSchema);
     let error = connect(&address).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DeviceVersion);
@@ -74,7 +74,7 @@ fn upload(address: &Address) -> Result<Client, Error> {
 }
 
 #[test]
-fn a_table_goes_over_in_pieces_and_comes_back() {
+fn a_table_is_sent_in_pieces_and_read_back() {
     let client = upload(&common::tcp(Vice::None)).unwrap();
     assert_eq!(client.losses().repeats, 0);
     assert_eq!(client.hello().serial, *b"test peer 01");
@@ -82,7 +82,7 @@ fn a_table_goes_over_in_pieces_and_comes_back() {
 
 #[cfg(unix)]
 #[test]
-fn a_table_goes_over_a_serial_device() {
+fn a_table_is_sent_over_a_serial_device() {
     let (address, _far_end) = common::pty(Vice::None);
     let client = upload(&address).unwrap();
     assert_eq!(client.losses().bad_frames, 0);
@@ -101,7 +101,7 @@ fn a_bit_that_flips_on_the_device_is_found_by_reading_back() {
 }
 
 #[test]
-fn refusals_come_in_words_and_too_long_a_table_is_not_even_begun() {
+fn refusals_have_messages_and_too_long_a_table_is_not_sent() {
     let error = upload(&common::tcp(Vice::RefusesTables)).unwrap_err();
     assert_eq!(error.code(), DeviceCode::DeviceRefused);
     assert!(error.cause().contains("not in rising order"), "{error}");
@@ -129,7 +129,7 @@ fn missing_samples_are_counted_across_the_wrap_and_commands_go_between() {
 }
 
 #[test]
-fn a_device_that_goes_away_is_reported_as_gone() {
+fn a_device_that_disconnects_is_reported() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = listener.local_addr().unwrap().port();
     let (give, take) = std::sync::mpsc::channel();

@@ -1,5 +1,5 @@
 //! The messages of the link as data, for programs in other languages: `clients/link.json`, from the types that both sides are compiled
-//! from. `LINK=overwrite` writes it anew.
+//! from. `LINK=overwrite` rewrites it.
 
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
@@ -81,5 +81,5 @@ fn the_published_messages_are_those_of_the_types() {
     if std::env::var("LINK").is_ok_and(|value| value == "overwrite") {
         std::fs::write(path, &text).unwrap();
     }
-    assert_eq!(std::fs::read_to_string(path).unwrap_or_default(), text, "`LINK=overwrite` writes it anew");
+    assert_eq!(std::fs::read_to_string(path).unwrap_or_default(), text, "`LINK=overwrite` rewrites it");
 }

@@ -60,7 +60,7 @@ fn firmware_is_sent_tried_confirmed_and_gone_back_from() {
 }
 
 #[test]
-fn firmware_of_another_key_board_or_build_is_refused_in_words() {
+fn firmware_of_another_key_board_or_build_is_refused_with_the_reason() {
     let device = device(Some(public_of(&key_of(&[7; 32]))));
     let refused = |images: &[Image]| send(&mut client(&device), images, |_| ()).unwrap_err().to_string();
     assert!(refused(&images(2, 8)).contains("signature"), "{}", refused(&images(2, 8)));

@@ -215,7 +215,7 @@ pub(super) fn unplace(p: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// All candidate effects, in the order of the library. What is part of the base model is no candidate: the gauge's offset is the
+/// All candidate effects, in the order of the library. What is part of the base model is not a candidate: the gauge's offset is the
 /// deadband, and the baselines offer a higher elastic order. What only differences between recordings show is found before the search.
 ///
 /// `added` are laws beyond the catalogue.

@@ -1,6 +1,6 @@
 //! Every number that decides, on one page: symbol, unit, value, statistical meaning, source.
 //!
-//! One file per stage of the diagnosis. Guards against division by zero and steps of numerical derivatives are no criteria; they stand
+//! One file per stage of the diagnosis. Guards against division by zero and steps of numerical derivatives are not criteria; they stand
 //! where they are used. Two ideas of inexactness meet here with several values, on purpose:
 //!
 //! | criterion | inexactness of | as a share of |
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_criterion_has_a_name_of_its_own_and_says_what_it_means() {
+    fn every_criterion_has_a_unique_name_and_a_meaning() {
         let mut names: Vec<&str> = PAGE.iter().flat_map(|s| s.criteria).map(|c| c.name).collect();
         let all = names.len();
         names.sort_unstable();

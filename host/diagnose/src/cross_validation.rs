@@ -282,7 +282,7 @@ impl HeldOutRows {
         (without, with, with < HELD_OUT_LEAVES * without && (tested || is_lower(&before, &after)))
     }
 
-    /// The last effect, but for the very last, without which the others predict held-out rows better than all together, whose error is
+    /// The last effect, except the very last, without which the others predict held-out rows better than all together, whose error is
     /// `with`, N; and the error without it, N.
     pub(super) fn harmful(&self, traces: &[Vec<f64>], with: f64) -> Option<(usize, f64)> {
         (0..traces.len().saturating_sub(1)).rev().find_map(|place| {

@@ -298,7 +298,7 @@ impl Located {
 fn judge(selected: &SelectionResult, excess: &Excess, line: Option<&Line>) -> Verdict {
     let small = excess.left <= excess.admitted;
     if selected.missing.is_empty() {
-        // A periodic residual is no noise, even where repeats seem to explain it; nor is a residual larger than any instrument's noise.
+        // A periodic residual is not noise, even where repeats seem to explain it; nor is a residual larger than any instrument's noise.
         let steady = line.is_none_or(|l| l.share < LINE_UNEXPLAINED) && !excess.restless;
         if small && steady { Verdict::Consistent } else { Verdict::Unexplained }
     } else if (excess.explained >= EXPLAINED || small)

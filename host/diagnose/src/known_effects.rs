@@ -47,7 +47,7 @@ pub(super) fn check(given: &[Law]) -> Result<()> {
             }
             Some(Imitates::ElasticOrders) => {
                 return refused(
-                    format!("`{}` cannot be given: it is offered before any effect is weighed", law.name()),
+                    format!("`{}` cannot be given: it is offered before any effect is tested", law.name()),
                     "leave it out, or fit with `host fit --order`",
                 );
             }

@@ -15,7 +15,7 @@ use super::baselines::{PriorDeviations, keeps};
 use super::criteria::baseline::{ELASTIC_DEVIATIONS, EXPECTED_DEVIATIONS, FRICTION_DEVIATIONS};
 use super::linear::{Sign, amplitudes, solve_symmetric};
 
-/// What evidence is weighed with.
+/// What the evaluation of evidence needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scale {
     /// Sum of the rows' weights.
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn what_tables_imitate_earns_nothing_and_what_saves_them_from_differing_earns_much() {
+    fn effects_that_tables_imitate_gain_nothing_and_effects_that_make_tables_equal_gain_much() {
         let scale = Scale { weight: 100.0, independent: 100.0, sigma: 0.1, blocked: 100.0 };
         let nothing = Products::default();
         // A surface of 5 N rms that differs between pressures.

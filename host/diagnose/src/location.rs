@@ -282,7 +282,7 @@ fn names(rows: &Rows, from: f64, to: f64) -> Vec<String> {
 }
 
 /// Values with whole blocks in another order, each rotated in itself: both what belongs to a block and what belongs to a place
-/// within it are torn from the coordinate, while the residual's own correlation stays.
+/// within it are separated from the coordinate, while the residual's own correlation stays.
 pub(crate) fn shuffled(values: &[f64], blocks: &[(usize, usize)], random: &mut Random) -> Vec<f64> {
     let mut order: Vec<usize> = (0..blocks.len()).collect();
     for i in (1..order.len()).rev() {

@@ -91,7 +91,7 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
     for i in 0..rows.len() {
         let c = rows.contexts()[i];
         if rows.root_weight()[i] > 0.0 && !rows.vented[i] && (c.speed != 0.0 || rows.isometric) {
-            // Repeats at another speed are no repeats.
+            // Repeats at another speed are not repeats.
             // (At held length the place on the staircase takes the speed's part, and the run the cycle's.)
             let speed = if rows.isometric {
                 (c.pressure / top * REPEAT_PRESSURE_BINS).round() as i32
@@ -249,7 +249,7 @@ mod tests {
     /// A residual that drifts slowly through each recording: friction, which changes its sign with every stroke, is estimated beside it
     /// from many rows, a drift from as few as the residual itself.
     #[test]
-    fn a_slow_residual_says_little_about_slow_traces_only() {
+    fn a_slow_residual_weakens_slow_traces_only() {
         let campaign = recorded(loops(&[0.2]), 4, |_, _| 0.0, |_, _, _| 0.0);
         let (rows, _) = prepare(&campaign, &geometry().build().expect("a braid")).expect("rows");
         let step = typical_step(&rows);

@@ -35,7 +35,7 @@ pub struct Refitted {
     pub reserve: Option<Reserve>,
 }
 
-/// Fits the table anew beside the named effects. They are kept only where the recordings are then predicted better, or about as well
+/// Refits the table beside the named effects. They are kept only where the recordings are then predicted better, or about as well
 /// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case.
 ///
 /// # Errors

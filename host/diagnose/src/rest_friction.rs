@@ -3,7 +3,7 @@
 //! The model holds the sign of the last motion. On a real bench the air's ripple shakes the braid, so that friction ends near
 //! the middle of the gap between the branches, and a regulator that drifts by a few kilopascals reverses it: static friction
 //! carries small changes of pressure (a play of half-width `h`), what goes beyond lets the strands slip, and over a change `b`
-//! the friction follows to the other branch. That is no missing physics of the model in motion; but left out, every effect that
+//! the friction follows to the other branch. That is not missing physics of the model in motion; but left out, every effect that
 //! acts at rest would be mistaken for it. The rows at rest decide which of the three it is, and how fast.
 
 use rayon::prelude::*;

@@ -99,7 +99,7 @@ fn strongest(power: &[f64], lowest: usize) -> Option<(usize, f64, f64)> {
         .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The strongest line in a weighted residual, where there is enough of it to tell. What repeats with the strokes themselves is no
+/// The strongest line in a weighted residual, where there is enough of it to decide. What repeats with the strokes themselves is no
 /// line: a quarter of a typical half-stroke is the longest period.
 pub(crate) fn line(
     rows: &Rows,

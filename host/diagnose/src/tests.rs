@@ -134,7 +134,7 @@ fn strokes_that_do_not_repeat_are_not_consistent() {
         let said = d.remarks.iter().any(|r| matches!(r, Remark::NotRepeatable(_)));
         assert_eq!(said, verdict == Verdict::Unexplained, "{share}");
     }
-    // A sensor's own white noise is no physics, however coarse the sensor.
+    // A sensor's own white noise is not physics, however coarse the sensor.
     let d = ask(&recorded(loops, 22, |random, _| 0.01 * largest * random.normal(), |_, _, _| 0.0));
     assert_eq!((d.verdict(), names(&d)), (Verdict::Consistent, vec![]), "{:?}", d.remarks);
 }
@@ -180,7 +180,7 @@ fn the_end_of_the_sensors_range_is_no_physics() {
 }
 
 #[test]
-fn wandering_noise_and_outliers_are_not_named() {
+fn drifting_noise_and_outliers_are_not_named() {
     for seed in 10..13 {
         let wander = |r: &mut Random, s: &mut [f64; 2]| {
             s[0] += 0.02 * r.normal();
@@ -243,7 +243,7 @@ fn a_late_cell_is_distinguished_from_a_loose_joint_and_its_dead_time_found() {
 }
 
 #[test]
-fn an_unknown_zero_is_not_called_a_lag_that_nobody_has_seen() {
+fn an_unknown_zero_is_not_called_an_unobserved_lag() {
     // At one speed a settling of most of the pull within 0.3 s would take the misfit as well.
     for (speed, offset) in [(1.0, 4.0), (1.0, 8.0), (3.0, 8.0)] {
         let d = ask(&recorded(loops(&[speed]), 5, coloured(0.1, 2.0), |_, _, _| offset));
@@ -309,9 +309,9 @@ fn viscous_damping_is_found_with_its_size() {
 }
 
 #[test]
-fn what_is_given_is_fitted_and_judged_by_the_recordings() {
+fn given_effects_are_fitted_and_judged_by_the_recordings() {
     let rubbed = recorded(loops(&[0.1, 0.4]), 3, coloured(0.1, 2.0), |_, sign, _| -4.0 * sign);
-    // What is there is found with its size whatever else was looked at …
+    // What is there is found with its size whatever else was tested …
     let d = diagnosed_with(&rubbed, &["coulomb-friction"]).expect("an answer");
     assert_eq!(names(&d), ["coulomb-friction"]);
     let m = &d.missing[0];
@@ -337,7 +337,7 @@ fn what_is_given_is_fitted_and_judged_by_the_recordings() {
 }
 
 #[test]
-fn what_the_base_holds_already_cannot_be_given() {
+fn effects_of_the_base_model_cannot_be_given() {
     let campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
     let refused = |given: &[&str]| diagnosed_with(&campaign, given).expect_err("refused").to_string();
     assert!(refused(&["gauge-offset"]).contains("deadband"));
@@ -358,7 +358,7 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn bad_input_is_answered_in_words() {
+fn bad_input_is_answered_with_a_message() {
     let straight = |n: usize, f: &dyn Fn(f64) -> (f64, f64, f64)| {
         let mut r = Recording { name: "r".into(), ..Recording::default() };
         let mut force = Vec::new();
@@ -397,7 +397,7 @@ fn bad_input_is_answered_in_words() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_said() {
+fn limits_of_the_judgement_are_reported() {
     let whole = recorded(loops(&[0.2]), 7, coloured(0.1, 2.0), |_, _, _| 0.0);
     let one_pressure = Campaign::new(vec![whole.recordings[2].clone()]);
     let mut short = one_pressure.clone();

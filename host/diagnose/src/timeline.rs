@@ -57,7 +57,7 @@ pub struct Options<'a> {
     pub muscle: Option<&'a MuscleDescription>,
     /// Index of the campaign that the others are compared with.
     pub reference: usize,
-    /// Whether the actuator was mounted anew between campaigns.
+    /// Whether the actuator was remounted between campaigns.
     pub mounted: Mounted,
 }
 

@@ -83,7 +83,7 @@ pub struct Missing {
     pub share_explained: f64,
     /// Its parameters.
     pub parameters: Vec<ParameterValue>,
-    /// Effects that these data cannot tell from it.
+    /// Effects that these data cannot distinguish from it.
     pub confusable_with: Vec<String>,
     /// Where it acts.
     pub place: Link,
@@ -101,7 +101,7 @@ pub struct Missing {
     pub source: String,
     /// The largest force that it makes in these recordings, N.
     pub peak_N: f64,
-    /// Probability of having found as much by chance over all effects looked at, by whole blocks.
+    /// Probability of having found as much by chance over all effects tested, by whole blocks.
     pub p: f64,
     /// Why this one.
     pub why: Why,
@@ -269,7 +269,7 @@ pub struct Diagnosis {
     pub held_out: HeldOut,
     /// What to record next.
     pub next_experiment: Option<NextExperiment>,
-    /// All effects looked at.
+    /// All effects tested.
     pub considered: Vec<Considered>,
     /// The forward selection, step by step.
     pub path: Vec<PathStep>,

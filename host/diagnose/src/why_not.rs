@@ -5,7 +5,7 @@
 pub enum WhyNot {
     /// Nothing was fitted.
     NotJudged,
-    /// These recordings cannot tell it from an effect that is named.
+    /// These recordings cannot distinguish it from an effect that is named.
     Confusable,
     /// These recordings do not excite it.
     NotExcited,

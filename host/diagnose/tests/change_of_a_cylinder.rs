@@ -48,10 +48,10 @@ fn the_other_way_round_the_gain_is_lost_again() {
 }
 
 #[test]
-fn what_names_leave_above_the_spread_of_reruns_is_said_to_be_left() {
+fn a_residual_above_the_spread_of_reruns_is_reported() {
     let before = campaign("rerun_2_o-ring257");
     let mut after = campaign("rerun_3_o-ring257");
-    // A load cell that yields softly at its end is no change of the list; gain and friction take most of it, but not all.
+    // A load cell that yields softly at its end is not a change of the list; gain and friction take most of it, but not all.
     for recording in &mut after.recordings {
         let end = 290.0;
         recording.force.iter_mut().flatten().for_each(|f| *f = end * (*f / end).tanh());

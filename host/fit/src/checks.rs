@@ -180,7 +180,7 @@ impl Checks {
     /// Reads checks; of two of the same kind the later one counts.
     ///
     /// # Errors
-    /// Files that cannot be read, tables without a reference, or too short to tell anything.
+    /// Files that cannot be read, tables without a reference, or too short to be of use.
     pub fn read(files: &[impl AsRef<Path>]) -> Result<Self> {
         let mut checks = Self::default();
         for file in files {

@@ -12,7 +12,7 @@ use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Follower};
 
 /// By amplitude, the force in every row of all recordings, N. `shapes` are the effect's other parameters. Lengths are corrected as
-/// the table's mountings tell, and rests between recordings count as in a prediction.
+/// the table's mountings give, and rests between recordings count as in a prediction.
 ///
 /// # Errors
 /// [`DataCode::TableInvalid`] where the table cannot be evaluated.

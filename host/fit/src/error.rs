@@ -10,6 +10,6 @@ error_codes! {
             "record more pressures, and more lengths or longer strokes";
         /// The fitted table has values that no muscle has, or contradicts its recordings.
         FitImplausible = "fit::implausible", Input,
-            "correct the cause, or write the table all the same with --force";
+            "correct the cause, or write the table nevertheless with --force";
     }
 }

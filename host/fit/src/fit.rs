@@ -20,7 +20,7 @@
 //! | `P0` from a higher order | `Deadband` | [`deadband`] |
 //! | smoothing of the curves, stress that rises with strain | `Smoothing` | [`smoothing`], [`monotonic_stress`] |
 //! | effective dimensions | `Problem` | [`dimensions`], [`dimension_search`] |
-//! | dimensions that held lengths ask for | `Solution` | [`held_lengths`] |
+//! | dimensions that held lengths require | `Solution` | [`held_lengths`] |
 //! | errors as the thesis measures them | `ChunkError` | [`chunks`], [`errors`], [`midline`] |
 //! | models to compare with | `Model` | [`models`] |
 //! | uncertainty, and what the data do not determine | `Uncertain` | [`uncertainty`], [`identifiability`] |
@@ -84,7 +84,7 @@ pub struct Options {
     pub fit_lengths: bool,
     /// Whether the bladder's stress is constrained to rise with strain.
     pub physical: bool,
-    /// Whether dimensions and lengths stay as described where recordings at held lengths ask for others; see `held_lengths`.
+    /// Whether dimensions and lengths stay as described where recordings at held lengths require others; see `held_lengths`.
     pub as_described: bool,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
 //! of known length the memories fade as they do in time; an unknown pause counts as a minute. Between recordings at held lengths the
-//! muscle is vented ([`crate::vented_rest`]), and for longer where it is mounted anew.
+//! muscle is vented ([`crate::vented_rest`]), and for longer where it is remounted.
 
 use std::borrow::Cow;
 use std::fmt::Write;

@@ -15,7 +15,7 @@ const NEAR_ZERO: f64 = 0.01;
 /// Creep between filling and emptying looks like a small negative friction. Its force, as a share of the blocked force, is no more than
 /// the drift of a polymer bladder over one staircase, some per cent; below this the sign or the timing of a column is wrong.
 const CREEP: f64 = 0.03;
-/// A mean error above this, percent of blocked force, is no description of the recordings: a wrong unit, sign or dimension is more likely
+/// A mean error above this, percent of blocked force, is not a description of the recordings: a wrong unit, sign or dimension is more likely
 /// than physics that the model lacks.
 pub const WORST_MEAN_ERROR: f64 = 10.0;
 /// A force that rises by this share over the tested contraction is none that friction, creep, or a mounting error of a millimetre feigns.

@@ -169,7 +169,7 @@ impl TableFile {
     /// [`DataCode::TableInvalid`], saying what is wrong with the bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let wrong = |cause: String| Error::new(DataCode::TableInvalid, cause);
-        let damaged = "the file was damaged or cut short; copy it again or fit the muscle anew";
+        let damaged = "the file was damaged or cut short; copy it again or fit the muscle again";
         if bytes.len() < HEADER || bytes[..4] != MAGIC {
             return Err(wrong("this is not a table file".into())
                 .help("tables end in .pam and are written by `host fit` or `host diagnose`"));
@@ -179,7 +179,7 @@ impl TableFile {
             return Err(wrong(format!(
                 "the file has table format {found}, this program reads table formats {WITHOUT_EARLIER_LOAD} and {VERSION}"
             ))
-            .help("use the version of the program that wrote it, or fit the muscle anew"));
+            .help("use the version of the program that wrote it, or fit the muscle again"));
         }
         let length = u32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]) as usize;
         if length > MAX_BODY || bytes.len() != HEADER + length + CHECKSUM {
@@ -249,7 +249,7 @@ impl About {
             .earlier_load
             .is_some_and(|l| [l.pressure, l.seconds].iter().any(|x| !(*x >= 0.0 && x.is_finite())))
         {
-            return wrong("an earlier load that is no pressure and time");
+            return wrong("an earlier load that is not a pressure and a time");
         }
         if let Some(u) = &self.uncertainty {
             let expected = (u.rows as usize).checked_mul(u.columns as usize);
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read() {
+    fn a_written_table_is_read_back() {
         let bytes = example().to_bytes().expect("valid");
         assert_eq!(TableFile::from_bytes(&bytes).expect("valid"), example());
     }

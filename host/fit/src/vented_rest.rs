@@ -1,8 +1,8 @@
 //! The time before recordings at held lengths, as memories of the load see it.
 //!
 //! Between two recordings the muscle is vented in [`VENTING`] seconds, rests without pressure, and is filled from there to the first
-//! reading. Where it was mounted anew in between, it may have carried a load without a recording ([`EarlierLoad`]). Recordings
-//! in motion say nothing about the time between them.
+//! reading. Where it was remounted in between, it may have carried a load without a recording ([`EarlierLoad`]). Recordings
+//! in motion do not show the time between them.
 
 use model_core::effects::{Context, EffectName, FittedEffect};
 use model_core::motion::Motion;
@@ -27,7 +27,7 @@ const FILLING: f64 = 1.0;
 /// From the end of an earlier load to the first recording, s.
 const VENTED_BEFORE: f64 = 30.0;
 
-/// Whether an effect of a table asks for the time before recordings.
+/// Whether an effect of a table requires the time before recordings.
 #[must_use]
 pub fn matters(effects: &[FittedEffect]) -> bool {
     effects.iter().any(|e| e.effect == EffectName::BladderCreep)
@@ -54,7 +54,7 @@ pub fn contexts(
     moments
 }
 
-/// What is assumed about rests that no clock tells.
+/// What is assumed about rests that no clock shows.
 #[must_use]
 pub fn remark(rests: &[Rest]) -> Option<String> {
     let assumed = |after: Preceding, what: &str| {

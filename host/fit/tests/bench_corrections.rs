@@ -166,7 +166,7 @@ fn a_loose_joint_holds_still_for_its_width_after_a_turn() {
 }
 
 #[test]
-fn what_pressure_turns_at_held_length_turns_behind_a_loose_joint_too() {
+fn friction_that_the_pressure_reverses_at_held_length_reverses_behind_a_loose_joint_too() {
     let width = 0.2e-3;
     let muscle = muscle();
     let at = |stroke: f64, speed: f64, direction: f64, kpa: f64| {

@@ -19,7 +19,7 @@ use crate::results::{self, Provenance};
 use crate::shard::Shard;
 use crate::work_item::{Inputs, WorkItem};
 
-/// The version of the stored results: a new one computes everything anew.
+/// The version of the stored results: a new one computes everything again.
 const FORMAT: u32 = 1;
 /// Failures that a summary lists; the table `failures` lists all.
 const MOST_LISTED: usize = 100;
@@ -223,7 +223,7 @@ impl Shared<'_> {
 
     fn reused(&self, muscle: &str) {
         let failed = self.output.has_failures(muscle);
-        // What needs no computing says nothing about the remaining time.
+        // What needs no computing does not show the remaining time.
         let total = self.total.fetch_sub(1, Ordering::Relaxed) - 1;
         self.progress.total(total);
         let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);

@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_and_nan_is_missing() {
+    fn written_columns_are_read_back_and_nan_is_missing() {
         let bytes = example().to_parquet(&[("key", "7")]).expect("written");
         let again = Columns::from_parquet(bytes::Bytes::from(bytes.clone())).expect("read");
         let mut expected = example();

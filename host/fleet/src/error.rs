@@ -10,7 +10,7 @@ error_codes! {
             "give one row per muscle with the columns muscle, description and files";
         /// A folder holds no results of `host batch`, or damaged ones.
         FleetInvalid = "fleet::invalid", Input,
-            "run `host batch MANIFEST -o FOLDER`; delete the folder of a damaged muscle first, and it is computed anew";
+            "run `host batch MANIFEST -o FOLDER`; delete the folder of a damaged muscle first, and it is computed again";
         /// Some muscles of a batch failed, and the call requires an exit status that says so.
         FleetFailed = "fleet::failed", Input,
             "read the table `failures`, which names cause, place and remedy of each";

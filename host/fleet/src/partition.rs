@@ -26,7 +26,7 @@ pub const TABLES: [&str; 4] = ["fits", "tables", "diagnoses", "failures"];
 const PARTIAL: &str = ".partial";
 const PREFIX: &str = "muscle=";
 
-/// The name of a muscle's folder, as engines decode it: what is no letter, digit, `-`, `_` or `.` is percent-encoded.
+/// The name of a muscle's folder, as engines decode it: what is not a letter, digit, `-`, `_` or `.` is percent-encoded.
 ///
 /// ```
 /// assert_eq!(pam_fleet::partition::folder_name("mini 1/a"), "muscle=mini%201%2Fa");
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_interrupted_run_left_goes_and_a_living_run_keeps_its_place() {
+    fn remains_of_an_interrupted_run_are_removed_and_a_running_one_is_kept() {
         let root = tempfile::tempdir().expect("a folder");
         let dead = root.path().join(PARTIAL).join("run-dead");
         fs::create_dir_all(dead.join("muscle=a")).expect("made");

@@ -152,7 +152,7 @@ impl Protocol {
     /// Parses a protocol file and checks its numbers.
     ///
     /// # Errors
-    /// Text that is no protocol, or a number out of range.
+    /// Text that is not a protocol, or a number out of range.
     pub fn from_toml(text: &str) -> Result<Self, ProtocolError> {
         let p: Self = toml::from_str(text).map_err(|e| ProtocolError::Text(e.to_string()))?;
         p.check()?;

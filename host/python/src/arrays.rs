@@ -34,7 +34,7 @@ pub(crate) fn numbers<'py>(name: &str, values: &Bound<'py, PyAny>) -> PyResult<B
     }
     numpy.call_method1("asarray", (values, "float64")).map_err(|e| {
         raised(
-            Error::new(DataCode::CallInvalid, format!("`{name}` is no array of numbers: {}", e.value(py))).help(
+            Error::new(DataCode::CallInvalid, format!("`{name}` is not an array of numbers: {}", e.value(py))).help(
                 "give a numpy array, a list or a column of a data frame; missing values are not filled in",
             ),
         )

@@ -102,7 +102,7 @@ impl Exchange {
         }
         if queue.rows.len() >= BACKLOG {
             return Err(Error::new(DataCode::CallInvalid, format!("{BACKLOG} samples were not taken"))
-                .help("take the samples in a loop, or ask for fewer per second"));
+                .help("take the samples in a loop, or request fewer per second"));
         }
         queue.rows.extend(row(sample));
         drop(queue);
@@ -363,7 +363,7 @@ impl Link {
         if let Some(words) = reach.and_then(|reach| reach.beyond(quantity, &profile)) {
             if !beyond {
                 return Err(raised(
-                    Error::new(DataCode::CallInvalid, words).help("ask for less, or pass beyond=True"),
+                    Error::new(DataCode::CallInvalid, words).help("request less, or pass beyond=True"),
                 ));
             }
             warn(py, &[words])?;

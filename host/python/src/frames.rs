@@ -92,7 +92,7 @@ fn columns(frame: &Bound<'_, PyAny>) -> PyResult<Vec<(String, TableColumn)>> {
     } else if frame.hasattr("keys")? {
         frame.call_method0("keys")?
     } else {
-        return Err(wrong(format!("a {} is no data frame", frame.get_type().name()?)));
+        return Err(wrong(format!("a {} is not a data frame", frame.get_type().name()?)));
     };
     let mut table = Vec::new();
     for name in names.try_iter()? {

@@ -35,7 +35,7 @@ def test_frames_of_every_kind_become_the_same_recording():
         (read,) = pam.from_frame(make(columns), name="run 1", muscle=muscle)
         same(read, recording)
         assert read.name == "run 1"
-    # Nothing but the interface, of chunks, single precision, and missing values.
+    # Only the interface, of chunks, single precision, and missing values.
     chunks = pyarrow.chunked_array([columns["force_N"][:100].astype(np.float32), columns["force_N"][100:].astype(np.float32)])
     table = pyarrow.table({**columns, "force_N": chunks})
     only = type("Only", (), {"__arrow_c_stream__": lambda self, requested_schema=None: table.__arrow_c_stream__(requested_schema)})()

@@ -78,7 +78,7 @@ def test_it_works_inside_scikit_learn():
     np.testing.assert_allclose(make_pipeline(kilopascals, pam.MuscleRegressor(muscle)).fit(scaled, y).score(scaled, y), pam.MuscleRegressor(muscle).fit(X, y).score(X, y))
 
 
-# Checks of scikit-learn that feed random numbers, which are no recordings of a muscle, or need scikit-learn's own way of checking inputs.
+# Checks of scikit-learn that feed random numbers, which are not recordings of a muscle, or need scikit-learn's own way of checking inputs.
 def test_checks_of_scikit_learn_that_need_no_random_data_pass():
     import sklearn.utils.estimator_checks as checks
 

@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_round_and_tell_each_other_apart() {
+    fn ticks_are_round_and_distinct() {
         assert_eq!(texts(&linear_ticks(-0.3, 10.2, 5)), ["0", "2", "4", "6", "8", "10"]);
         assert_eq!(texts(&linear_ticks(0.0, 0.08, 5)), ["0.00", "0.02", "0.04", "0.06", "0.08"]);
         assert_eq!(texts(&linear_ticks(-1.0, 1.0, 4)), ["−1.0", "−0.5", "0.0", "0.5", "1.0"]);
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_counted_has_whole_ticks() {
+    fn counts_have_whole_ticks() {
         assert_eq!(texts(&whole_ticks(0.92, 3.08, 5)), ["1", "2", "3"]);
         assert_eq!(texts(&whole_ticks(0.7, 8.3, 4)), ["2", "4", "6", "8"]);
         assert_eq!(texts(&whole_ticks(0.95, 1.05, 4)), ["1"]);
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_hold_the_data_whatever_it_is() {
+    fn ends_hold_any_data() {
         let cases = [None, Some((0.0, 0.0)), Some((5.0, 5.0)), Some((-1.0, 3.0)), Some((1e-9, 1e9))];
         for axis in [Axis::new("a", ""), Axis::log("a", ""), Axis::new("a", "").from_zero()] {
             for data in cases {

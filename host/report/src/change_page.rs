@@ -69,7 +69,7 @@ fn header(page: &mut Page, r: &ChangeReport) {
     if r.shows_in_force() {
         let h = &r.held_out;
         page.fact(
-            "on recordings held out",
+            "on held-out recordings",
             format!("{} → {} N", significant(h.rms_before_N, 2), significant(h.rms_after_N, 2)),
             "difference without and with the named changes",
             if h.rms_after_N < h.rms_before_N { Tone::Good } else { Tone::Bad },
@@ -92,7 +92,10 @@ fn changes(r: &ChangeReport) -> Section {
             wording::owner(m.owner)
         ));
         if !m.confusable_with.is_empty() {
-            section.text(format!("These recordings cannot tell it from {}.", m.confusable_with.join(", ")));
+            section.text(format!(
+                "These recordings cannot distinguish it from {}.",
+                m.confusable_with.join(", ")
+            ));
         }
         let apart = separate::named(m);
         if !apart.is_empty() {

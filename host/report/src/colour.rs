@@ -2,7 +2,7 @@
 //!
 //! A mark carries both a literal colour, which any program that reads SVG understands, and a class, which a browser
 //! uses to follow the reader's preference. The eight series colours differ in lightness as well as in hue, after Okabe
-//! and Ito's palette for people who cannot tell red from green.
+//! and Ito's palette for people who cannot distinguish red from green.
 
 use std::fmt::Write as _;
 

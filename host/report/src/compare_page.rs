@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_says_in_a_sentence_which_pulls_more_and_tells_equal_names_apart() {
+    fn the_page_states_which_pulls_more_and_distinguishes_equal_names() {
         let (a, b) = (recording("before", 0.0), recording("after", 4.9));
         let page = page(&a, &b, &compare(&a, &b).expect("a comparison"));
         let (_, verdict) = page.verdict.clone().expect("a verdict");

@@ -173,7 +173,7 @@ fn recommendation(d: &Diagnosis) -> Section {
     let memory: Vec<&Missing> = muscle.iter().copied().filter(|m| is_from_history(m)).collect();
     if !memory.is_empty() {
         steps.push(format!(
-            "Repeat a run at one mounting after a vented hour: it shows how {} recovers.",
+            "Vent the muscle for an hour, then repeat a run at the same mounting: it shows how {} recovers.",
             names(&memory)
         ));
     }

@@ -1,4 +1,4 @@
-//! The report of a fit: every figure of the thesis for any muscle, and what one expects of a fit besides.
+//! The report of a fit: every figure of the thesis for any muscle, and what else one expects of a fit.
 
 mod controller;
 mod curves;

@@ -20,8 +20,8 @@ pub(crate) fn with_half(estimate: &Estimate, scale: f64, decimals: usize) -> Str
 pub(crate) fn assumed(history: &History) -> String {
     let loaded = format!("loaded for {:.0} s before the first run", history.law.loaded_before_s);
     match history.law.pause_s {
-        Some(pause) => format!("chosen on a grid, weakly known: pause between runs {pause} s, {loaded}"),
-        None => format!("pauses between runs by the clock; chosen on a grid, weakly known: {loaded}"),
+        Some(pause) => format!("chosen on a grid, uncertain: pause between runs {pause} s, {loaded}"),
+        None => format!("pauses between runs by the clock; chosen on a grid, uncertain: {loaded}"),
     }
 }
 

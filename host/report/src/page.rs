@@ -11,7 +11,7 @@ pub enum Tone {
     Plain,
     /// As required.
     Good,
-    /// To be looked at.
+    /// To be checked.
     Caution,
     /// Wrong.
     Bad,
@@ -55,7 +55,7 @@ impl Table {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// With one more row, whose name leads to another file; an empty address is no link.
+    /// With one more row, whose name leads to another file; an empty address is not a link.
     pub fn linked_row(
         &mut self,
         address: impl Into<String>,
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_in_which_nothing_stands_is_not_shown() {
+    fn an_empty_column_is_not_shown() {
         let mut table = Table::new("", &["name", "remark", "value", "more"]);
         table.row(["a", "", "1", ""]);
         table.row(["b", "", "", ""]);

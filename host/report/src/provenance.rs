@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_report_says_what_it_was_made_from() {
+    fn a_report_lists_its_inputs() {
         let muscle = MuscleDescription::parse(
             "name = \"mini-1\"\nkind = \"contractile\"\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
              bladder_outer_diameter_mm = 3.0\nbladder_wall_mm = 0.5\n",

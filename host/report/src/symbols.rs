@@ -129,7 +129,7 @@ mod tests {
     ];
 
     #[test]
-    fn every_letter_that_is_explained_stands_in_an_equation_where_it_is_no_parameter() {
+    fn every_explained_letter_that_is_not_a_parameter_is_in_an_equation() {
         for &(letter, _) in SYMBOLS {
             let used = Candidate::all().any(|c| symbols(c.info()).rows.iter().any(|r| r[0] == letter));
             assert!(used, "{letter} is in no equation");

@@ -68,7 +68,7 @@ fn diagnosis_section(diagnosis: &Diagnosis) -> Section {
 fn course_section(result: &document::Campaign) -> Section {
     let mut section = Section::new("Course");
     section.text(
-        "Each step is the one that was expected to tell most per second: about the table, about which effect is missing, and about effects \
+        "Each step is the one with the most expected information per second: about the table, about which effect is missing, and about effects \
          that nothing had shown yet. The first steps are the same in every campaign.",
     );
     let mut table = Table::new("Steps in order", &["step", "from, s", "what", "why", "what it showed"]);

@@ -32,7 +32,7 @@ const LONGEST_ARMED_SILENCE: u32 = 3_600_000;
 
 /// Time beyond the silence of a host until its fault shows.
 const MARGIN: Duration = Duration::from_secs(2);
-/// Time between two looks at the state of a controller.
+/// Time between two checks of the state of a controller.
 const POLL: Duration = Duration::from_millis(50);
 
 /// Everything that carries out steps.

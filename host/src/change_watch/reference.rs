@@ -85,7 +85,7 @@ pub struct ReferenceOptions {
     /// How to read a reference that is not in the usual form: an import description.
     #[arg(long, value_name = "IMPORT.toml", requires = "reference", help_heading = "Comparison")]
     reference_import: Option<PathBuf>,
-    /// The actuator was taken off and mounted anew since the reference: a shift of the length by 1 mm is no change.
+    /// The actuator was taken off and remounted since the reference: a shift of the length by 1 mm is not a change.
     #[arg(long, requires = "reference", help_heading = "Comparison")]
     remounted: bool,
 }

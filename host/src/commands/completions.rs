@@ -29,7 +29,7 @@ impl Arguments {
     }
 }
 
-/// Shells offer files after an option of which nothing is known; here that is everything that is no path.
+/// Shells offer files after an option of which nothing is known; here that is everything that is not a path.
 fn files_for_paths_only(command: &mut clap::Command) {
     let taken = std::mem::take(command);
     let hinted = taken.mut_args(|arg| {

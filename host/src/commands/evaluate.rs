@@ -56,7 +56,7 @@ pub struct Arguments {
     /// Correct the length of every mounting by up to 1 mm.
     #[arg(long)]
     fit_lengths: bool,
-    /// Keep the described dimensions and lengths, also where recordings at held lengths ask for others.
+    /// Keep the described dimensions and lengths, also where recordings at held lengths require others.
     #[arg(long, conflicts_with_all = ["fit_geometry", "fit_lengths"])]
     as_described: bool,
     /// A published formula to compare with.

@@ -55,7 +55,7 @@ impl Arguments {
     /// # Errors
     /// A file that cannot be read or is not a table; one that the description does not suffice for.
     pub fn run(self, console: &Console) -> Result<()> {
-        // A pipe gives its rows once, and they are looked at several times.
+        // A pipe gives its rows once, and they are read several times.
         let folder = tempfile::tempdir().map_err(|e| Error::unwritable(std::env::temp_dir(), &e))?;
         let files = self.guess.iter().map(|f| kept(f, folder.path())).collect::<Result<Vec<PathBuf>>>()?;
         let (Some((first, others)), Some(named)) = (files.split_first(), self.guess.first()) else {

@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_answer_is_asked_for_again_at_once() {
+    fn a_wrong_answer_is_requested_again_immediately() {
         let (text, complaints) = answered("m\npull\npush\nlong\n0.039\n39\n28.6\n61.4\n3\n1.5\n0.5\n600\n");
         let muscle = MuscleDescription::parse(&text.unwrap()).unwrap();
         assert_eq!(muscle.max_pressure_kPa, Some(600.0));

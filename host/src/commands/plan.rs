@@ -19,7 +19,7 @@ use pam_data::error::{DataCode, Error, Result};
     host plan --muscle mini.toml -o plan\n  \
     host plan --muscle mini.toml loops/*.csv -o plan --for diagnosis\n  \
     host plan --table mini.pam protocol.toml\n\n\
-    With --muscle the plan continues the recordings: each step is the one that is expected to tell most per second after those before \
+    With --muscle the plan continues the recordings: each step is the one with the most expected information per second after those before \
     it, as in `host campaign`. The folder receives plan.md with instructions for the operator, and one protocol file for each step, \
     which `virtual-bench record --protocol` runs. The same data give the same plan.\n\n\
     With --table the command judges a protocol: which effects it shows, and which of them it does not distinguish.")]
@@ -39,7 +39,7 @@ pub struct Arguments {
     /// What the recordings are for.
     #[arg(long = "for", value_enum, value_name = "PURPOSE", default_value_t = For::Both, conflicts_with = "table")]
     purpose: For,
-    /// Steps at most, besides the tare at the end.
+    /// Steps at most, not counting the tare at the end.
     #[arg(long, value_name = "N", default_value_t = 5, conflicts_with = "table")]
     steps: u16,
     /// Bench time of all steps at most, min.

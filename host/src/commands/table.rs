@@ -109,7 +109,7 @@ impl Arguments {
                 let valid = faults.is_empty();
                 let refused = Error::new(FitCode::FitImplausible, "the table is useless for control")
                     .file(&file.table)
-                    .help("fit it anew from better recordings or with other dimensions");
+                    .help("fit it again from better recordings or with other dimensions");
                 if file.json {
                     let check = document::Check { schema: "pam-check/1", valid, remarks, faults };
                     console.result(text(&check)?);

@@ -51,7 +51,7 @@ pub(crate) struct Step {
     pub spoiled: Vec<String>,
 }
 
-/// What a step was expected to tell.
+/// The information that a step was expected to give.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Expected {

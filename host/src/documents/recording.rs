@@ -65,7 +65,7 @@ impl Run {
 pub(crate) struct RunRequest {
     pub mode: &'static str,
     pub setpoint_profile: Option<String>,
-    /// Of the joint; null but for an angle.
+    /// Of the joint; null without an angle.
     pub stiffness_Nm_per_rad: Option<f64>,
     /// The unit of the setpoint.
     pub unit: &'static str,
@@ -114,7 +114,7 @@ pub(crate) mod schema {
         about: About,
         mode: Option<String>,
         setpoint_profile: Option<String>,
-        /// Of the joint; null but for an angle.
+        /// Of the joint; null without an angle.
         stiffness_Nm_per_rad: Option<f64>,
         /// The unit of the setpoint, and of the deviation from it.
         unit: Option<String>,

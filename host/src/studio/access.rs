@@ -27,7 +27,7 @@ pub(super) fn same(a: &str, b: &str) -> bool {
     a.as_bytes().ct_eq(b.as_bytes()).into()
 }
 
-/// The one value of a header; `Err` where it is given twice or is no text, `Ok(None)` where it is not given.
+/// The one value of a header; `Err` where it is given twice or is not text, `Ok(None)` where it is not given.
 fn single_value(headers: &HeaderMap, name: HeaderName) -> Result<Option<&str>, ()> {
     let mut all = headers.get_all(name).iter();
     match (all.next(), all.next()) {

@@ -75,7 +75,7 @@ impl Analysis {
         })
     }
 
-    /// The table of the last fit, when it is the one of this name: what is sent is what was looked at.
+    /// The table of the last fit, when it is the one of this name: what is sent is what was shown.
     ///
     /// # Errors
     /// [`DataCode::CallInvalid`] when another fit ended since.

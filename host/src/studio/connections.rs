@@ -15,7 +15,7 @@ use tokio::task::JoinHandle;
 
 /// Time for the head of a request, and for its body.
 pub(super) const ARRIVAL: Duration = Duration::from_secs(10);
-/// Pause after the system refused a connection, for instance for want of file handles.
+/// Pause after the system refused a connection, for instance for lack of file handles.
 const REFUSED: Duration = Duration::from_millis(50);
 
 /// What is bounded.
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_connection_beyond_the_limit_is_closed_and_the_others_go_on() {
+    fn a_connection_beyond_the_limit_is_closed_and_the_others_continue() {
         let address = start(Limits { connections: 1, ..Limits::default() });
         let mut first = connect(address);
         let ask = |stream: &mut TcpStream| {

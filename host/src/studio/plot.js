@@ -54,12 +54,12 @@ class Ring {
 }
 
 // A ring's samples drawn together in stretches of time as long as one column of pixels: of each curve the least, the greatest, the
-// first and the last. Only samples that are new are looked at, so that a picture costs its width, not its window times the rate.
+// first and the last. Only samples that are new are examined, so that a picture costs its width, not its window times the rate.
 // A sample that is infinite is a reading that its sensor cannot give: on which side it left is kept, and nothing else. One that is not a
 // number is none, and leaves a gap.
 class Stretches {
   constructor(ring, names) { this.ring = ring; this.names = names; this.step = 0; this.room = 0; }
-  // Takes in what came since the last time; begins anew where the window, the width or the recording is another.
+  // Takes in what came since the last time; restarts where the window, the width or the recording is another.
   follow(seconds, width) {
     const r = this.ring, step = seconds / width, room = width + 2;
     if (step !== this.step || room !== this.room || r.cleared !== this.cleared) {

@@ -1,7 +1,7 @@
 //! The page's server: this machine only, and orders only from who holds the token.
 //!
 //! Every request must name this server as its host and, where a browser says from where it comes, as its origin; whatever reads or
-//! orders anything also needs the token, which is made anew at each start. Another page in the same browser can therefore neither
+//! orders anything also needs the token, which is made again at each start. Another page in the same browser can therefore neither
 //! read nor order anything, regardless of what it resolves its name to.
 //!
 //! Nothing on the server's thread waits for a computation, a file or a controller.

@@ -294,7 +294,7 @@ fn the_path_of_a_vent_only_vents_and_only_for_the_page() {
 }
 
 #[test]
-fn what_runs_is_compared_with_a_recording_made_before_and_can_be_vented_meanwhile() {
+fn a_run_is_compared_with_an_earlier_recording_and_can_be_vented_meanwhile() {
     run(async {
         // Three times as fast as the clock, a busy machine would soon be called silent.
         let (mut studio, _device) = with_a_bench(0.4, 3.0).await;

@@ -1,4 +1,4 @@
-//! Checks of the bench: what dead weights, a rigid bar and a reference gauge tell, and what a diagnosis makes of it.
+//! Checks of the bench: what dead weights, a rigid bar and a reference gauge show, and what a diagnosis makes of it.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -126,7 +126,7 @@ fn diagnosed(bench: &BenchSpec, checks: Checks) -> Diagnosis {
 }
 
 #[test]
-fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
+fn an_error_that_a_check_measured_is_the_only_name() {
     let mut faulty = bench();
     faulty.instruments.force.gain = 0.04;
     let answer = diagnosed(&faulty, read(&faulty));
@@ -135,7 +135,7 @@ fn what_a_check_measured_is_named_and_nothing_else_has_to_explain_it() {
     let gain = &answer.missing[0];
     assert!(gain.checked && gain.correction && gain.confusable_with.is_empty());
     assert!((gain.parameters[0].value - 0.04).abs() < 2e-3, "{:?}", gain.why);
-    // What the checks cleared is said to be clear, with a bound.
+    // What the checks cleared is reported as clear, with a bound.
     let cleared = answer.considered.iter().find(|c| c.effect == "gauge-gain").expect("looked at");
     let why_not = pam_report::wording::why_not(cleared);
     assert!(why_not.contains("a reference gauge"), "{why_not}");
@@ -165,7 +165,7 @@ fn a_play_that_a_rigid_bar_shows_is_named_where_it_matters() {
 }
 
 #[test]
-fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
+fn weighing_shows_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
     let size = 0.04 * 120.0;
     let (mut heavy, mut offset) = (bench(), bench());
     heavy.rig.weight = size;
@@ -198,9 +198,9 @@ fn weighing_says_whether_a_constant_force_is_a_weight_or_a_wrong_zero() {
     }
 }
 
-/// Loops hardly tell a leak from a friction that differs between the directions, or from a gauge that reads too much.
+/// Loops hardly distinguish a leak from a friction that differs between the directions, or from a gauge that reads too much.
 #[test]
-fn a_closed_valve_says_whether_a_loss_of_pull_is_a_leak() {
+fn a_closed_valve_shows_whether_a_loss_of_pull_is_a_leak() {
     // The recordings do not show the smaller leak; the valve does.
     for leak in [0.05, 0.01, 0.0] {
         let mut bench = bench();

@@ -190,7 +190,7 @@ fn in_millimetres(mut protocol: Protocol, muscle: &Muscle) -> Protocol {
     protocol
 }
 
-/// Takes `basis` out of a column; `None` where nothing but rounding is left.
+/// Takes `basis` out of a column; `None` where only rounding is left.
 fn left(column: &[f64], basis: &[Vec<f64>]) -> Option<Vec<f64>> {
     let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let whole = size(column);

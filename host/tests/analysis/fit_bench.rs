@@ -45,7 +45,7 @@ fn the_three_muscles_of_the_thesis() {
     }
 }
 
-/// Noise of force asks for stiff curves over pressure. Friction, which falls with pressure, must not become flatter by it: the mean of
+/// Noise of force requires stiff curves over pressure. Friction, which falls with pressure, must not become flatter by it: the mean of
 /// several noisy campaigns is the truth.
 #[test]
 fn noise_of_force_does_not_flatten_friction_over_pressure() {
@@ -255,7 +255,7 @@ fn a_spike_is_found_listed_and_does_no_harm() {
 }
 
 #[test]
-fn stress_rises_with_strain_where_it_is_asked_for() {
+fn stress_rises_with_strain_where_it_is_required() {
     let spec = presets::contractile();
     let campaign = thesis(&spec, &presets::large_pressures(), 4, 8.0);
     let options = Options { physical: true, ..Options::default() };

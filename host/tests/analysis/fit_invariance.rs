@@ -32,7 +32,7 @@ fn assert_close(a: &Fit, b: &Fit, share: f64) {
     }
 }
 
-/// Files of different pressures, each with its own clock: their order says nothing about a muscle without memory.
+/// Files of different pressures, each with its own clock: their order does not matter for a muscle without memory.
 #[test]
 fn the_order_of_files_changes_nothing() {
     let spec = presets::miniature();

@@ -1,6 +1,6 @@
 //! Recordings of a kind that a tidy campaign does not have: the fit gives the truth, or gives the reason why not.
 //!
-//! The truth is the thesis's own model (shared/model.md), written out here once more, so that nothing but the recording is odd.
+//! The truth is the thesis's own model (shared/model.md), written out here once more, so that only the recording is odd.
 
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
@@ -180,10 +180,10 @@ fn one_held_length_determines_no_deadband() {
     assert!(found.summary.warnings.iter().any(|w| w.contains("one length")), "{:?}", found.summary.warnings);
 }
 
-/// A length that is read anew in each run is one length: three mountings determine no more coefficients than three lengths do, and a length
+/// A length that is read again in each run is one length: three mountings determine no more coefficients than three lengths do, and a length
 /// between them is predicted.
 #[test]
-fn a_mounting_whose_length_is_read_anew_in_each_run_is_one_length() {
+fn a_mounting_whose_length_is_read_again_in_each_run_is_one_length() {
     let (mut noise, mut gauge) = (Noise::new(7, 0.0), Noise::new(8, 0.0));
     let mut run = |stroke: f64| {
         let mut r = Recording { force: Some(Vec::new()), ..Recording::default() };
@@ -215,7 +215,7 @@ fn a_mounting_whose_length_is_read_anew_in_each_run_is_one_length() {
     assert!((predicted - truth).abs() < 0.03 * blocked, "{predicted} N, {truth} N, blocked {blocked} N");
 }
 
-/// Readings in another unit, and readings of a loose plug, change nothing but their own rows: in the table, in what it predicts, and in
+/// Readings in another unit, and readings of a loose plug, change only their own rows: in the table, in what it predicts, and in
 /// the answer of a diagnosis.
 #[test]
 fn a_gauge_that_falls_out_does_no_harm() {
@@ -367,7 +367,7 @@ fn a_prediction_of_a_recording_with_decimal_commas_can_be_read_again() {
 }
 
 /// The rig pushes the muscle against its contraction stop. Polynomials that followed the wall would be wrong where the muscle pulls; and
-/// the wall is no noise, so that a diagnosis names it.
+/// the wall is not noise, so that a diagnosis names it.
 #[test]
 fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_does_not_bend_the_table() {
     let mut noise = Noise::new(8, 0.0);
@@ -399,7 +399,7 @@ fn a_contraction_stop_that_the_rig_pushes_against_is_named_and_does_not_bend_the
 
 /// A muscle that hangs slack nearly everywhere leaves too few rows for an answer, and the answer states the reason.
 #[test]
-fn where_slack_rows_leave_too_few_to_judge_the_remarks_say_so() {
+fn the_remarks_report_where_slack_rows_leave_too_few_to_judge() {
     let mut noise = Noise::new(9, 0.0);
     let mut recordings = SIX.map(|p| strokes(p, 40, 8.0, 0.0, 0, (0.05, &mut noise)));
     for r in &mut recordings {

@@ -49,7 +49,7 @@ fn described_dimensions_stay_where_others_describe_the_force_no_better() {
     let text = fitted.summary.to_string() + &fitted.summary.warnings.join("\n");
     assert!(text.contains("held lengths (3 mountings)"), "{text}");
     for advice in ["longer stroke", "slow stroke"] {
-        assert!(!text.contains(advice), "{advice:?} is no advice for held lengths: {text}");
+        assert!(!text.contains(advice), "{advice:?} is not advice for held lengths: {text}");
     }
 }
 
@@ -83,7 +83,7 @@ fn a_force_in_another_unit_is_reported_though_fitted_dimensions_describe_it() {
 }
 
 #[test]
-fn mountings_of_equal_length_are_kept_apart_by_their_labels() {
+fn mountings_of_equal_length_are_separated_by_their_labels() {
     let spec = presets::contractile();
     let mut all = Vec::new();
     for label in ["first", "second"] {

@@ -106,7 +106,7 @@ fn a_muscle_brings_its_table_and_the_order_is_that_of_the_dates() {
 }
 
 #[test]
-fn wrong_calls_say_what_is_wrong_with_which_campaign() {
+fn wrong_calls_name_the_campaign_and_the_fault() {
     let folder = tempfile::tempdir().unwrap();
     let campaigns = months(folder.path(), 1, |_, _| 0.0);
     let (status, _, said) = history(folder.path(), &[&campaigns[0]]);

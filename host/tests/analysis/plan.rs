@@ -75,7 +75,7 @@ fn a_plan_without_recordings_begins_with_the_first_steps_and_continues_with_thei
         let why = step["why"].as_str().unwrap();
         assert!(why.ends_with('.') && why.matches(". ").count() == 0, "one sentence: {why}");
     }
-    // Each step tells most per second after those before it, so the rate falls.
+    // Each step has the most information per second after those before it, so the rate falls.
     let rates: Vec<f64> = steps
         .iter()
         .map(|s| {

@@ -71,7 +71,7 @@ fn every_muscle_of_2021_has_its_settled_points() {
 }
 
 #[test]
-fn the_pressure_alone_tells_filling_from_emptying() {
+fn the_pressure_alone_distinguishes_filling_from_emptying() {
     for mm in [83, 182, 382] {
         let muscle = format!("festo10-2022-{mm}mm.toml");
         let Some(campaign) =
@@ -246,7 +246,7 @@ fn a_length_that_was_not_recorded_is_predicted_from_the_others() {
     }
 }
 
-/// A run whose force is in another unit, and spikes of the pressure, are no reason to see no memory in the others, and none of these readings
+/// A run whose force is in another unit, and spikes of the pressure, are not a reason to see no memory in the others, and none of these readings
 /// is taken for an error.
 #[test]
 fn failing_sensors_leave_the_memory_of_the_other_readings() {

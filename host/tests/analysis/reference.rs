@@ -126,7 +126,7 @@ fn untouched_recordings_with_a_length_are_consistent() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_said_with_a_remedy() {
+fn sides_that_cannot_be_compared_are_refused_with_a_remedy() {
     let bench = Bench::new();
     let before = bench.runs("before", Some(("displacement_mm", 0.0)), same);
     let elsewhere = bench.runs("elsewhere", Some(("displacement_mm", 9.0)), same);

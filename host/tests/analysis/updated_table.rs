@@ -67,7 +67,7 @@ fn two_pressures_after_more_friction_update_the_table_for_all_of_them() {
 }
 
 #[test]
-fn a_whole_campaign_after_the_change_is_fitted_anew_and_a_slip_is_refused() {
+fn a_whole_campaign_after_the_change_is_refitted_and_a_slip_is_refused() {
     let before = recorded(&bench(1), |_| true);
     let mut rubbing = bench(2);
     rubbing.muscle.physics.seal =

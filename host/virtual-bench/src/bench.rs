@@ -8,7 +8,7 @@ use crate::rig::{Rig, RigState};
 use crate::sensors::{Channel, Instruments};
 use serde::{Deserialize, Serialize};
 
-/// A muscle on a bench; everything that a recording depends on besides the protocol.
+/// A muscle on a bench; everything that a recording depends on, except the protocol.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BenchSpec {
     /// The muscle.

@@ -6,7 +6,7 @@
 //! `dz_i/dξ = (1 − z_i sgn dξ)/δ_i`,  `friction = W Σ a_i z_i`,
 //!
 //! so that in full sliding the friction is `W sgn v`. `W = k_F(P) |F_core|`: what presses the strands together is the braid's
-//! tension, and with it the muscle's force. The travel `dξ = dx + s dP` counts, besides the stroke, what the strands slip
+//! tension, and with it the muscle's force. The travel `dξ = dx + s dP` counts, in addition to the stroke, what the strands slip
 //! under the ends while the pressure changes at held length (fibres stretch and settle): filling acts like shortening. This
 //! makes the gap between filling and emptying that isometric recordings show. Changes within the lock `±h` of the last
 //! pressure that moved the strands are carried by their static friction and move nothing: a regulator's ripple does not

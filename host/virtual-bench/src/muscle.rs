@@ -23,7 +23,7 @@ pub enum Kind {
 pub struct Deadband {
     /// Radial gap between bladder and braid at rest, m: the bladder is stretched across it before the braid feels anything.
     pub gap: f64,
-    /// Pressure that is lost besides, Pa.
+    /// Pressure that is lost in addition, Pa.
     pub lost: f64,
 }
 

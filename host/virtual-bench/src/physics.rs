@@ -268,7 +268,7 @@ impl PhysicsState {
         level
     }
 
-    /// Forces that oppose motion besides the braid's friction, N.
+    /// Forces that oppose motion in addition to the braid's friction, N.
     pub fn drag(&mut self, m: &Moment) -> f64 {
         let v = m.speed();
         let mut drag = self.on.viscous.map_or(0.0, |c| (c.drag + c.per_pressure * m.pressure) * v);

@@ -8,11 +8,11 @@ use std::f64::consts::TAU;
 #[serde(default, deny_unknown_fields)]
 pub struct Rig {
     /// Spring rate of frame and couplings, N/m; 0 for rigid. The muscle pulls its frame along and is shorter than the
-    /// crosshead tells.
+    /// crosshead shows.
     pub stiffness: f64,
     /// Play of a joint, m: the muscle's end follows the crosshead only at the play's edges, which are soft.
     pub play: f64,
-    /// Zero error of the stroke, m: the muscle is shorter by this than the crosshead tells.
+    /// Zero error of the stroke, m: the muscle is shorter by this than the crosshead shows.
     pub offset: f64,
     /// Moving mass between muscle and cell, kg.
     pub mass: f64,
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_soft_frame_holds_what_a_muscle_pulls_with_whose_strands_stick() {
+    fn a_soft_frame_balances_the_pull_of_a_muscle_with_sticking_strands() {
         // Four times as stiff as the frame, until the friction of 40 N is full.
         let mut r = RigState::new(Rig { stiffness: 1e5, ..Rig::default() });
         let force = |x: f64| 100.0 - (4e5 * x).min(40.0) - 2e3 * x;
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_gives_while_the_pressure_rises_at_a_crosshead_that_stands() {
+    fn a_frame_yields_while_the_pressure_rises_at_a_fixed_crosshead() {
         let mut r = RigState::new(Rig { stiffness: 1e6, ..Rig::default() });
         for newtons in 0..1000 {
             let x = r.stroke(0.0, |x| f64::from(newtons) - 8e4 * x);

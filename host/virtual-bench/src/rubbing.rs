@@ -1,4 +1,4 @@
-//! Friction besides the braid's own law: seals, strand contact, ageing contacts, speed, memory of reversals.
+//! Friction other than the braid's own law: seals, strand contact, ageing contacts, speed, memory of reversals.
 
 use serde::{Deserialize, Serialize};
 

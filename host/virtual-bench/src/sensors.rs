@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn coloured_noise_has_the_asked_deviation_and_memory() {
+    fn coloured_noise_has_the_required_deviation_and_memory() {
         let mut c = Channel::new(Sensor { coloured: (2.0, 1.0), ..Sensor::default() }, 3, "x");
         c.follow(0.1, 0.0);
         let y: Vec<f64> = (0..40_000).map(|_| c.sample(0.1)).collect();

@@ -1,4 +1,4 @@
-//! The bladder: a thick-walled incompressible tube, and the braid that tells its radius.
+//! The bladder: a thick-walled incompressible tube, and the braid that gives its radius.
 //!
 //! A tube of rest length L0, outer radius R_b and inner radius R_b − t is stretched to length L and held at outer radius R.
 //! Incompressibility places the ring that rested at ρ0 at `ρ² = R² − (R_b² − ρ0²)/λ_z` with `λ_z = L/L0`, so its stretches are

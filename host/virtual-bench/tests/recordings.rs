@@ -162,7 +162,7 @@ fn a_vented_muscle_neither_pulls_nor_pushes() {
 }
 
 #[test]
-fn files_have_the_agreed_columns_and_the_thesiss_raw_form_says_the_same() {
+fn files_have_the_agreed_columns_and_the_thesiss_raw_form_agrees() {
     let spec = BenchSpec::laboratory(presets::miniature(), 3);
     let muscle = Muscle::new(spec.muscle.clone());
     let levels = presets::miniature_pressures();

@@ -15,7 +15,7 @@
 //!
 //! One memory with two signs: where the wall resists much (shortened) the pull grows with the logarithm of time, at full length it
 //! falls. The sign changes where the wall takes `b/c`. Nothing recovers faster than it came: a vented muscle forgets over the same
-//! decades. The memory begins unloaded: before its first reading, and when it is mounted anew, a muscle hung vented for long.
+//! decades. The memory begins unloaded: before its first reading, and when it is remounted, a muscle hung vented for long.
 //!
 //! The law was found on isometric recordings; under motion it is a prediction. `log-creep` differs: its three laws are alternatives
 //! with one free time, of which none changes its sign with length.

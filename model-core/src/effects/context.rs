@@ -38,7 +38,7 @@ pub struct Context<T> {
     pub since_reversal: T,
     /// How long the muscle rested before its present motion, or has been resting, s.
     pub hold_time: T,
-    /// 1 while the muscle rests, 0 while it moves. A caller that leaves it at 0 tells a rest by a growing hold time.
+    /// 1 while the muscle rests, 0 while it moves. A caller that leaves it at 0 shows a rest by a growing hold time.
     pub resting: T,
     /// Strokes back and forth so far, in full cycles.
     pub cycles: T,

@@ -19,7 +19,7 @@ use crate::scalar::Scalar;
 /// `N` time constants for each of `D` drives, kept in an effect's memory.
 ///
 /// Layout: seen, pending time, step that the shares hold for, `N` shares `1 − a`, `D` last drives, `N × D` over-stresses, `D` sums
-/// of the rest of them. The sums are taken once a step, so that a search for pressure asks for them at no cost.
+/// of the rest of them. The sums are taken once a step, so that a search for pressure reads them at no cost.
 pub struct Fading<const N: usize, const D: usize>;
 
 const SEEN: usize = 0;

@@ -2,7 +2,7 @@
 //!
 //! With `k_F ± Δk/2` for the two directions the base model's `−s k_F F` gains an even part: `F_add = −(Δk/2) · F_quasi` while a
 //! direction is known. In a recording of full loops it cannot be reported from a gain of the load cell or the gauge; a dwell
-//! approached from both sides can tell.
+//! approached from both sides can show.
 
 use super::{
     Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,

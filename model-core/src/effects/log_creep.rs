@@ -10,7 +10,7 @@
 //!
 //! Three drives, three laws (their amplitudes may be tried singly):
 //!
-//! | amplitude | drive `u` | tells |
+//! | amplitude | drive `u` | shows |
 //! | --- | --- | --- |
 //! | `relaxing_part_per_decade` | [`F_b`](Context::bladder) where the muscle pulls, N | stress fades in proportion to the bladder's stress |
 //! | `strain_modulus_per_decade`, Pa | `c_1 = (V_B/L) ε_z − t L² ε_x/(2πN²R)`, m² | stress fades in proportion to strain, regardless of the pressure |

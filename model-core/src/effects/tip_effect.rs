@@ -40,7 +40,7 @@ impl Effect for TipEffect {
     const TRAITS: Traits = Traits::shown_by(Experiment::EndsAndDiameter)
         .check(BenchCheck::EndsAndDiameter)
         .imitates(Imitates::Description)
-        .changed(Changed::new(Class::Alone(Self::INFO.name), Owner::Muscle, "the ends are no cylinders"));
+        .changed(Changed::new(Class::Alone(Self::INFO.name), Owner::Muscle, "the ends are not cylinders"));
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let cross_section = T::from_f64(core::f64::consts::PI) * context.radius * context.radius;

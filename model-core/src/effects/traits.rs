@@ -1,4 +1,4 @@
-//! What a diagnosis has to know of an effect beside its equations. A controller never asks for it, so its image carries none of it.
+//! What a diagnosis has to know of an effect beside its equations. A controller never needs it, so its image carries none of it.
 
 use super::change::Changed;
 
@@ -111,7 +111,7 @@ pub struct Traits {
     pub made_from_base: bool,
     /// How a change of it shows between two campaigns; `None` for what no comparison looks for.
     pub changed: Option<Changed>,
-    /// Whether amplitudes and shapes that were fitted freely can belong to one and the same cause.
+    /// Whether amplitudes and shapes that were fitted freely can belong to the same cause.
     pub consistent: fn(amplitudes: &[f64], shapes: &[f64]) -> bool,
 }
 
@@ -165,7 +165,7 @@ impl Traits {
     pub const fn made_from_base(self) -> Self {
         Self { made_from_base: true, ..self }
     }
-    /// The same, mistaken for something that is no effect.
+    /// The same, mistaken for something that is not an effect.
     #[must_use]
     pub const fn imitates(self, what: Imitates) -> Self {
         Self { imitates: Some(what), ..self }

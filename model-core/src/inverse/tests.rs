@@ -81,7 +81,7 @@ fn from_five_kilopascals_away_three_steps_are_enough() {
 }
 
 #[test]
-fn what_is_out_of_reach_is_said() {
+fn unreachable_forces_are_reported() {
     let m = muscle();
     let at_stroke = m.at_stroke(Length::ZERO);
     let at = |n| m.pressure_for(Force::from_newtons(n), &at_stroke, 0.0, Pressure::ZERO, &m.search());

@@ -65,7 +65,7 @@ pub struct StrokeLoop {
     pub load_n: f32,
     /// Stiffness of the load, N/m: force grows by it with the demanded stroke.
     pub load_stiffness_n_per_m: f32,
-    /// Largest force that the loop may ask for, N.
+    /// Largest force that the loop may demand, N.
     pub force_limit_n: f32,
 }
 
@@ -91,7 +91,7 @@ pub struct Joint {
     pub integral_nm_per_rad_s: f32,
     /// Damping, N·m·s/rad.
     pub damping_nm_s_per_rad: f32,
-    /// Largest torque that the loop may ask for, N·m.
+    /// Largest torque that the loop may demand, N·m.
     pub torque_limit_nm: f32,
 }
 
@@ -250,7 +250,7 @@ pub struct Watch {
     pub silence_ticks: u32,
     /// How long a running mode continues without a keep-alive request of the session that owns it, ticks; above zero.
     pub host_silence_ticks: u32,
-    /// Whether a running mode may continue without a host without end. Off unless someone asks for it.
+    /// Whether a running mode may continue without a host without end. Off unless a user sets it.
     pub autonomous: bool,
     /// Ticks missed in a row before the fault.
     pub overrun_ticks: u16,

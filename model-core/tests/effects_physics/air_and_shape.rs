@@ -73,7 +73,7 @@ fn stretching_fibres_change_gaylords_force_by_their_first_order() {
 }
 
 #[test]
-fn what_the_wall_carries_does_not_stretch_the_fibres() {
+fn load_carried_by_the_wall_does_not_stretch_the_fibres() {
     let muscle = Muscle::<f64>::build(&table::example()).expect("a valid table");
     let braid = muscle.braid();
     let (b, n, compliance) = (braid.fibre_length(), braid.turns(), 1e-6);

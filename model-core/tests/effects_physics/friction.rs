@@ -157,7 +157,7 @@ fn speed_and_pressure_laws() {
 }
 
 #[test]
-fn what_changes_the_balance_is_rubbed_with_it() {
+fn friction_scales_with_effects_that_change_the_balance() {
     let muscle = Muscle::<f64>::build(&table::example()).expect("a valid table");
     let pressure = Pressure::from_kilopascals(400.0);
     let motion = |stroke: f64, direction: f64| Motion { stroke, speed: 1e-3, direction, ..Motion::default() };
@@ -170,7 +170,7 @@ fn what_changes_the_balance_is_rubbed_with_it() {
             .parameters
             .iter()
             .map(|p| match (info.name, p.name) {
-                // What warmth does to friction itself is no part of the balance.
+                // What warmth does to friction itself is not part of the balance.
                 (_, "friction_loss_per_watt" | "friction_loss_per_kelvin" | "slip_time") => 0.0,
                 (_, "jamming_contraction") | ("cyclic-softening", "path") => p.low,
                 _ => 0.3 * p.low.max(0.0) + 0.7 * p.high,

@@ -122,7 +122,7 @@ fn a_fresh_pull_yields_and_remembers_it() {
         close(yielded, law, 0.11 * 2.0);
     }
     let left = alone.at(Context { dt: 0.1, quasi: 0.0, ..pulling });
-    assert!(left < -1.0, "let go, it comes back as slowly: {left}");
+    assert!(left < -1.0, "released, it comes back as slowly: {left}");
     let second_run = alone.at(Context { dt: 0.1, ..pulling });
     assert!(second_run < -3.0, "and pulls less from the first moment: {second_run}");
 }

@@ -124,7 +124,7 @@ impl Loop {
         self.plant.truth()
     }
 
-    /// Asks for a wave.
+    /// Requests a wave.
     ///
     /// # Panics
     /// When it is refused.
@@ -132,7 +132,7 @@ impl Loop {
         self.controller.reference(ReferenceOrder { reference, session: Session::default() }).expect("a wave");
     }
 
-    /// Asks for a value.
+    /// Requests a value.
     ///
     /// # Panics
     /// When it is refused.

@@ -77,7 +77,7 @@ impl PairLoop {
         this
     }
 
-    /// Asks for an angle (rad) and a stiffness (N·m/rad).
+    /// Requests an angle (rad) and a stiffness (N·m/rad).
     ///
     /// # Errors
     /// As [`Controller::set_point`].

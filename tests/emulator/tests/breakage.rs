@@ -83,7 +83,7 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
 }
 
 #[test]
-fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hold() {
+fn an_autonomous_device_continues_and_holds_where_a_hold_is_set() {
     let folder = Folder::new();
     let station = station();
     let Some(machine) = board(&folder, &station, false) else { return };
@@ -108,7 +108,7 @@ fn a_device_that_was_told_to_go_on_alone_does_and_holds_where_it_was_told_to_hol
     set(&["watch.autonomous=false", "watch.host_silence_ticks=1200", &hold]);
     killed_in_a_wave(&station, &line, &folder);
     let killed = station.periods();
-    // A wave never asks for the same three hundred times.
+    // A wave never requests the same three hundred times.
     let still = |now: usize| {
         let last = station.since(now.saturating_sub(300));
         last.iter().all(|exchange| exchange.command == last[0].command)
@@ -195,7 +195,7 @@ const TASKS_VECTOR: u32 = (16 + 10) * 4;
 const HANG: u16 = 0xE7FE;
 
 #[test]
-fn a_program_that_hangs_is_restarted_vented_and_says_so() {
+fn a_program_that_hangs_is_restarted_vented_and_reports_it() {
     let folder = Folder::new();
     let station = station();
     let Some(machine) = board(&folder, &station, true) else { return };
@@ -209,7 +209,7 @@ fn a_program_that_hangs_is_restarted_vented_and_says_so() {
     let tasks = debugger.word(TASKS_VECTOR) & !1;
     debugger.patch(tasks, HANG);
     debugger.detach();
-    // The bench is started anew by a board that starts, and so its record.
+    // The bench is restarted by a board that starts, and so its record.
     let deadline = Instant::now() + HOPELESS;
     while command(&station) > 0.0 {
         assert!(Instant::now() < deadline, "the watchdog does not bite");

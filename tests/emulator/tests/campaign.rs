@@ -81,7 +81,7 @@ fn a_campaign_with_a_testing_machine_on_serial_lines_is_killed_continues_and_ven
     let mut child = campaign(folder, &port, "6").spawn().expect("it starts");
     until_rows(folder, &mut child, before.len() + 60);
     interrupt(&child);
-    assert!(child.wait().expect("it ends").success(), "an interruption is no failure");
+    assert!(child.wait().expect("it ends").success(), "an interruption is not a failure");
     bench.until_vented();
     let after: HashSet<String> = rows(&folder.join("c")).into_iter().collect();
     assert!(before.iter().all(|row| after.contains(row)), "a row is gone");
@@ -146,7 +146,7 @@ fn prompted(folder: &Path, bench: &Bench) -> (Child, Arc<Mutex<String>>) {
 }
 
 #[test]
-fn an_operator_is_prompted_in_words_and_may_end_the_campaign_there() {
+fn an_operator_is_prompted_and_may_end_the_campaign_there() {
     let folder = folder("axis = 'prompt'\nstroke_max_mm = 12.0\n");
     let folder = folder.path();
     let bench = Bench::start(folder, SPEED);
@@ -157,7 +157,7 @@ fn an_operator_is_prompted_in_words_and_may_end_the_campaign_there() {
     // Waiting would close its input, which is an answer, too.
     until("it ends", || child.try_wait().expect("a process").is_some());
     let ended = child.wait().expect("it ends");
-    assert!(ended.success(), "an interruption is no failure: {}", said.lock().expect("text"));
+    assert!(ended.success(), "an interruption is not a failure: {}", said.lock().expect("text"));
     let before = rows(&folder.join("c"));
     assert!(!before.is_empty() && said.lock().expect("text").contains("interrupted"));
 

@@ -141,7 +141,7 @@ fn settled(ticks: &[Tick], scale: f64, value: impl Fn(&Tick) -> f64) -> usize {
 }
 
 #[test]
-fn what_was_out_of_reach_for_long_winds_no_integrator_up() {
+fn a_long_saturation_causes_no_integrator_windup() {
     let task = Task::of(presets::miniature());
     let bench = BenchSpec::laboratory(task.spec.clone(), 2);
     let blocked = task.blocked();
@@ -231,7 +231,7 @@ fn the_highest_pressure_of_the_table_is_never_passed() {
 }
 
 #[test]
-fn a_wish_that_stands_still_is_held_without_swinging_while_a_load_moves_the_muscle_and_while_none_does() {
+fn a_constant_setpoint_is_held_without_a_limit_cycle_with_and_without_a_moving_load() {
     use emulator_tests::sweep::{Law, Load, Subject};
     for spec in [presets::miniature(), presets::contractile(), presets::push()] {
         let subject = Subject::of(spec);

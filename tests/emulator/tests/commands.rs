@@ -84,7 +84,7 @@ impl Stand {
 }
 
 #[test]
-fn a_joint_takes_angle_and_stiffness_and_says_which_it_can_have() {
+fn a_joint_takes_angle_and_stiffness_and_reports_the_available_range() {
     let spec = presets::contractile();
     let joint = Arc::new(Mutex::new(pair::elbow(&spec)));
     let [first, second] = joint::Side::both(&joint);
@@ -180,7 +180,7 @@ fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_ro
     let path = stand.folder.path().join("force.csv");
     let (asked, force) = (column(&path, "setpoint"), column(&path, "force_N"));
     let wanted = |n: usize| 20.0 + 10.0 * (0.01 * (n as f64 / 2.5).floor()).sin();
-    // The points of the file come out of the device at their times, joined anew within a hundredth of a newton.
+    // The points of the file come out of the device at their times, joined again within a hundredth of a newton.
     let far = |shift: usize| (0..2_000).map(|n| (asked[shift + n] - wanted(n)).abs()).fold(0.0, f64::max);
     let worst = (0..800.min(asked.len() - 2_000)).map(far).fold(f64::INFINITY, f64::min);
     assert!(worst < 0.15, "{worst} N from the file");
@@ -349,7 +349,7 @@ fn softening(client: &mut pam_device::Client, muscle: &Muscle<f32>, samples: usi
 }
 
 #[test]
-fn what_a_muscle_remembers_is_there_after_the_plug_was_pulled_and_can_be_forgotten() {
+fn the_memory_of_a_muscle_survives_a_power_cut_and_can_be_cleared() {
     let station = || {
         let bench = BenchSpec::laboratory(presets::miniature(), 7);
         Watched::new(PlantStation::new(bench, held_and_stretched(), 1e-3))

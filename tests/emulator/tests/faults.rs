@@ -1,5 +1,5 @@
 //! Every fault that a plant or a host can cause, through the real link and the real image: noticed in time, vented or held,
-//! latched, counted, told, and left only by being cleared.
+//! latched, counted, reported, and left only by being cleared.
 
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ struct Case {
     fault: Fault,
     /// Periods from the cause to the vent.
     within: usize,
-    /// Settings that the case needs besides the defaults.
+    /// Settings that the case needs in addition to the defaults.
     settings: fn(&mut Settings),
     cause: Cause,
 }
@@ -186,7 +186,7 @@ fn a_fault_whose_cause_is_still_there_is_not_cleared() {
 }
 
 #[test]
-fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
+fn a_host_that_falls_silent_and_a_hold_that_was_requested() {
     let folder = Folder::new();
     let station = station();
     // No faster than a real board: the first setpoint must come before its silence is noticed.
@@ -204,11 +204,11 @@ fn a_host_that_falls_silent_and_a_hold_that_was_asked_for() {
     assert_eq!((report.fault, report.value, report.limit), (Fault::SetPointSilence, 2_001.0, 2_000.0));
     station.pass(100);
     let held = station.since(station.periods() - 50);
-    // The command is the demand and what the drift of this regulator asks for; held, it no longer moves.
+    // The command is the demand and what the drift of this regulator requires; held, it no longer moves.
     let first = held[0].command;
     assert!((first - 300e3).abs() < 10e3, "it holds {first} Pa");
     assert!(held.iter().all(|exchange| exchange.command == first), "it stays at {first} Pa");
-    // AtStroke pressure can still be let go of without leaving the fault.
+    // AtStroke pressure can still be released without leaving the fault.
     assert_eq!(client.call::<Stop>(&()).expect("it vents").state, State::Fault);
     station.pass(5);
     assert_eq!(station.since(station.periods() - 1)[0].command, 0.0);

@@ -76,13 +76,13 @@ fn check(image: &Path, map: &str) {
 }
 
 #[test]
-fn each_image_lies_where_its_boards_map_says() {
+fn each_image_lies_at_the_addresses_of_its_boards_map() {
     let (Ok(emulated), Ok(nucleo)) = (machine::image(), machine::nucleo_image()) else { return };
     check(&emulated, include_str!("../../../memory.x"));
     check(&nucleo, include_str!("../../../firmware/memory/nucleo-f446re.x"));
 }
 
-/// The table that the tests of the Nucleo's image send. `TABLE=overwrite` writes it anew.
+/// The table that the tests of the Nucleo's image send. `TABLE=overwrite` rewrites it.
 #[test]
 fn the_tests_of_the_nucleo_send_the_example_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../nucleo/example-table.bin");

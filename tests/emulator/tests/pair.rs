@@ -36,7 +36,7 @@ fn angle_and_stiffness_are_both_reached_wherever_both_muscles_can_pull() {
 }
 
 #[test]
-fn a_stiffer_joint_gives_way_less_to_a_push_and_roughly_as_much_as_it_says() {
+fn a_stiffer_joint_yields_less_to_a_push_and_roughly_as_much_as_stated() {
     let stiffnesses = [80.0, 110.0, 140.0, 170.0, 200.0, 230.0, 260.0];
     let mut ratios = Vec::new();
     let mut gave = Vec::new();
@@ -70,7 +70,7 @@ fn a_stiffer_joint_gives_way_less_to_a_push_and_roughly_as_much_as_it_says() {
 }
 
 #[test]
-fn what_cannot_be_had_is_refused_with_what_can() {
+fn unavailable_angles_and_stiffnesses_are_refused_with_the_range() {
     let spec = presets::miniature();
     let bench = BenchSpec::laboratory(spec.clone(), 5);
     let start = || {
@@ -85,7 +85,7 @@ fn what_cannot_be_had_is_refused_with_what_can() {
     let truth = Joint::new(&bench, 0.02, 0.002);
     assert!(truth.stiffness_at([380e3; 2], 0.0) < 0.01, "slack");
     let ends = [410e3, 620e3].map(|pascals| truth.stiffness_at([pascals; 2], 0.0));
-    eprintln!("{low:.2} to {high:.2} N·m/rad, in truth {ends:.2?}");
+    eprintln!("{low:.2} to {high:.2} N·m/rad, in fact {ends:.2?}");
     assert!((f64::from(low) / ends[0] - 1.0).abs() < 0.04 && (f64::from(high) / ends[1] - 1.0).abs() < 0.04);
     // Both ends are taken, and reached.
     for stiffness in [low + 0.2, high - 0.2] {

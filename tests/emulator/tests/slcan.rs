@@ -235,7 +235,7 @@ fn run_at(client: &mut Client, pascals: f32) {
 }
 
 #[test]
-fn a_table_goes_over_the_bus_and_a_run_is_controlled_and_vented_there() {
+fn a_table_is_sent_over_the_bus_and_a_run_is_controlled_and_vented_there() {
     for vice in [Vice::None, Vice::Mute, Vice::Chatters] {
         let bus = Bus::new(1, vice);
         let mut client = Client::open(&bus.address("1")).unwrap_or_else(|e| panic!("{vice:?}: {e}"));
@@ -293,7 +293,7 @@ fn each_address_is_a_controller_and_one_command_vents_all() {
 }
 
 #[test]
-fn an_address_where_nobody_is_and_an_adapter_that_refuses_are_reported_in_words() {
+fn an_address_without_a_device_and_an_adapter_that_refuses_are_reported() {
     let error_of = |bus: &Bus, device: &str| Client::open(&bus.address(device)).expect_err("nobody answers");
     let bus = Bus::new(1, Vice::None);
     let error = error_of(&bus, "3");

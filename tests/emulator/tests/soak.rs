@@ -261,7 +261,7 @@ fn every_fault_ends_vented_no_sample_is_missing_unreported_and_nothing_leaks() {
             assert!(stalls <= 1 + count / 20, "the machine is too busy for this test");
         }
         count += 1;
-        // What a program needs once is no leak.
+        // What a program needs once is not a leak.
         if count == 5 {
             first = Some(rig.studio.needs());
         }

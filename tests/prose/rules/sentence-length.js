@@ -1,4 +1,4 @@
-// Reports sentences of more than 35 words. Microsoft's style guide asks for short sentences without a number; plain-language guides
+// Reports sentences of more than 35 words. Microsoft's style guide requires short sentences without a number; plain-language guides
 // recommend 15 to 20 words on average and at most 30 to 35. A semicolon or a colon ends a sentence here: a list behind a colon counts
 // separately.
 "use strict";

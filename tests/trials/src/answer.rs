@@ -30,7 +30,7 @@ pub struct Answer {
     pub unexplained: Unexplained,
     /// The proposed recording.
     pub next_experiment: Option<serde_json::Value>,
-    /// What was weighed and not taken.
+    /// What was tested and not taken.
     pub considered: Vec<Considered>,
     /// Other remarks.
     pub remarks: Vec<String>,
@@ -88,7 +88,7 @@ pub struct Unexplained {
     pub share: Option<f64>,
 }
 
-/// An effect that was weighed.
+/// An effect that was tested.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]
 pub struct Considered {

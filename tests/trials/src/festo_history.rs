@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_muscles_share_is_pooled_and_the_end_effect_comes_out() {
+    fn shared_values_are_pooled_and_the_end_effect_is_found() {
         let answers = [100.0, 150.0, 220.0, 300.0].map(|l| muscle(l, 3.0));
         let answers: Vec<MuscleAnswer<'_>> =
             answers.iter().map(|a| MuscleAnswer { year: "2022", label: "x", answer: Some(a) }).collect();

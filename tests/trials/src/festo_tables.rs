@@ -90,7 +90,7 @@ fn contractions(text: &mut String, rows: &[Row]) {
         text,
         "\n### Unseen contractions through the table\n\nAll runs of a mounting that lies between others are predicted from the other mountings. \
          Settled points; mean absolute error and root mean square in percent of the largest force. \"A millimetre\": the mean change of \
-         the force when the held length is wrong by a millimetre, which is how exactly the lengths were set. \"Own length\" is no prediction: \
+         the force when the held length is wrong by a millimetre, which is how exactly the lengths were set. \"Own length\" is not a prediction: \
          memory, with the length, within a millimetre of the one that was set, that suits the readings of the mounting best. What the error \
          is above it comes from the lengths.\n\n\
          | set, muscle | base, mean | static, mean | memory, mean | own length, mean | base, rms | static, rms | memory, rms | \

@@ -59,9 +59,9 @@ pub struct Figures {
     pub detection: Option<Limit>,
     /// Sizes named by the right class in half and in nine tenths.
     pub naming: Option<Limit>,
-    /// Concealed effects that are in the set, or are said to be possible unseen.
+    /// Concealed effects that are in the set, or are reported as possible unseen.
     pub concealed_admitted: Rate,
-    /// … and of which it is said what to do.
+    /// … and for which the answer states what to do.
     pub concealed_advised: Rate,
     /// Stated 95 % intervals that hold.
     pub parameters: Rate,

@@ -99,7 +99,7 @@ enum Said {
     CouldHide,
     /// Something is unexplained, and nothing is named.
     Unexplained,
-    /// Nothing is named, and the effect is said to be smaller than it is.
+    /// Nothing is named, and the effect is reported as smaller than it is.
     Denied,
     /// Another effect is named.
     Wrong,
@@ -262,7 +262,7 @@ pub fn run(what: &Held) -> Result<(), Box<dyn Error>> {
 /// Beginning of the page.
 const INTRODUCTION: &str = "# Trials at held length\n\nWritten by `cargo run --release -p trials -- held -o DIR --page \
     docs/src/proof-held.md`; nothing here is typed by hand. Muscles of the virtual bench were recorded with their length held: pressure \
-    ramps or staircases, at one length or at three. Each muscle is drawn anew, with several sets of bristles, so that its friction turns \
+    ramps or staircases, at one length or at three. Each muscle is drawn separately, with several sets of bristles, so that its friction turns \
     over a wide range of pressure after a reversal. Rates have exact 95 % intervals in brackets.\n\n\
     - **Clean muscles**: nothing is left out. Every name is a false alarm.\n\
     - **One effect**: counted is what the answer says about it. \"Class or set\": another effect of the same class is named, or the effect is \
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_counted_as_what_it_says_about_the_effect() {
+    fn an_answer_is_counted_by_its_statement_about_the_effect() {
         let said = |answer: &Answer| Said::of(answer, "log-creep", 5.0);
         assert!(said(&answer(&["log-creep"], &[], None)) == Said::Named);
         assert!(said(&answer(&["stress-relaxation"], &[], None)) == Said::InClassOrSet);

@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn at_rest_length_the_bladder_does_nothing_and_the_pressure_pulls_as_gaylord_says() {
+    fn at_rest_length_the_bladder_does_nothing_and_the_pressure_pulls_by_gaylord() {
         let form = Form::quoted([74.085e6, -689.2e6, 1.837e9, -848.79e6], 0.0, 10e-3, 0.25);
         // P π D0²/4 (3 cos² θ − 1)/sin² θ
         let theta = ANGLE.to_radians();

@@ -47,7 +47,7 @@ pub struct Reference {
     /// DIR/training.jsonl: for `reference_baselines.py`.
     #[arg(long, value_name = "MUSCLES")]
     pairs: Option<u64>,
-    /// Only the trials against a table and the cylinder: their sections of the page are written anew, the others stay.
+    /// Only the trials against a table and the cylinder: their sections of the page are rewritten, the others stay.
     #[arg(long, requires = "page", conflicts_with_all = ["short", "pairs"])]
     sections: bool,
     /// Only the trials against a table, without a page.

@@ -19,9 +19,9 @@ const CONCEALED: [&str; 5] = ["tip-effect", "gravity", "contact-loss", "gauge-ga
 /// What was said of a concealed effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Concealed {
-    /// It is in the set, or it is said that it could be there at its true size, unseen or within a check's bound.
+    /// It is in the set, or the answer states that it could be there at its true size, unseen or within a check's bound.
     pub admitted: bool,
-    /// And nothing more is to be done about it (it is named, or a check has bounded it at its true size), or what to do is said of
+    /// And nothing more is to be done about it (it is named, or a check has bounded it at its true size), or the answer states what to do about
     /// this very effect: a recording that splits the set it is in, or what to measure.
     pub advised: bool,
 }

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_less_sure_is_no_answer_and_errors_count_among_answers_only() {
+    fn answers_below_the_threshold_do_not_count_and_errors_count_among_answers_only() {
         let outcomes = [
             outcome("gravity", &[("force-offset", 0.6)]),
             outcome("backlash", &[("backlash", 0.99)]),

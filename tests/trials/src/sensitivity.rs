@@ -126,7 +126,7 @@ fn folder(group: &[String], factor: f64) -> String {
     }
 }
 
-/// Whether a factor is applied to it, and the trials can tell.
+/// Whether a factor is applied to it, and the trials can show it.
 fn decides(stage: &str, c: &Criterion) -> bool {
     let other = OTHER_DATA.iter().any(|s| stage.to_lowercase().contains(s));
     !other && c.source != Source::Cost && c.scalable

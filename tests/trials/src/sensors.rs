@@ -310,7 +310,7 @@ fn page_text(what: &Sensors, table: &str) -> String {
          docs/src/proof-sensors.md`. Each row is one way to spoil one recording of a clean campaign of the virtual bench (random \
          muscles; six files of loops, or three staircases at held lengths). \"Found\": rows of that recording are excluded before \
          anything is fitted or diagnosed, and the message names file and rows. \"Another file accused\": rows of a clean recording are \
-         excluded. Rates with exact 95 % intervals. Bound set beforehand: 95 % found, no clean campaign accused.\n\n{table}",
+         excluded. Rates with exact 95 % intervals. Bound set in advance: 95 % found, no clean campaign accused.\n\n{table}",
         what.n, what.seed
     )
 }

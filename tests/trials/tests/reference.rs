@@ -31,7 +31,7 @@ fn changes_are_named_and_untouched_pairs_are_not() {
     // Two per cent of the pairs of the whole set; one of this share.
     let named = untouched.iter().filter(|t| !t["answer"]["named"].as_array().unwrap().is_empty()).count();
     assert!(named <= 1, "{named} of {} untouched pairs named", untouched.len());
-    // Of nothing but a table two per cent of the windows, too: none of this share.
+    // Of a table alone two per cent of the windows, too: none of this share.
     let against_table = answers[2].as_array().unwrap();
     let (changed, untouched): (Vec<_>, Vec<_>) = against_table.iter().partition(|t| t["effect"].is_string());
     let named = untouched.iter().filter(|t| !t["answer"]["named"].as_array().unwrap().is_empty()).count();

@@ -72,7 +72,7 @@ fn a_silent_tool_raises_no_alarm_and_names_nothing_and_seals_hold() {
 }
 
 #[test]
-fn answering_goes_on_where_it_was_broken_off_and_a_part_can_be_judged() {
+fn answering_continues_where_it_was_interrupted_and_a_part_can_be_judged() {
     let dir = scratch("part");
     let set = dir.join("set");
     let set_name = set.display().to_string();

@@ -55,7 +55,7 @@ fn crc16(bytes: &[u8]) -> u16 {
 pub struct Bench {
     uart: &'static Uart,
     tick: u32,
-    /// Whether the bench has been told to start from its initial state.
+    /// Whether the bench has been commanded to start from its initial state.
     started: bool,
     buffer: [u8; ANSWER],
     filled: usize,

@@ -94,7 +94,7 @@ const STALLED_US: u32 = 100_000;
 const READY_US: u32 = 10_000;
 /// Messages of either queue: more than a longest frame has.
 const QUEUE: usize = 96;
-/// Messages of a topic's frame are taken only while the queue has at least this much room besides.
+/// Messages of a topic's frame are taken only while the queue has at least this much room left.
 const ROOM: usize = QUEUE / 2;
 
 /// A classic message's length and data.

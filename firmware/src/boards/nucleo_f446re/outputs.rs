@@ -48,7 +48,7 @@ const PULSES: u32 = 0b111 << 12 | 0b111 << 4;
 const VALVE: u32 = 5;
 const LIGHT: u32 = 5;
 
-/// Makes both outputs safe: before any clock is set up, with nothing but the processor's own oscillator running.
+/// Makes both outputs safe: before any clock is set up, with only the processor's own oscillator running.
 pub fn start() {
     AHB1ENR.set(0b11);
     // The converter and the valves' timer.

@@ -1,7 +1,7 @@
 //! The independent watchdog, fed by a control tick that has done its work and by nothing else.
 //!
 //! It counts its own oscillator of 32 kHz (17 to 47) divided by 64. While the flash erases, the processor does not move for up to two
-//! seconds, so anyone who erases asks for patience and waits until a tick has granted it.
+//! seconds, so anyone who erases requests patience and waits until a tick has granted it.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

@@ -149,7 +149,7 @@ fn watches_have_these_ranges() {
 }
 
 #[test]
-fn what_a_board_does_not_have_is_not_watched() {
+fn inputs_that_a_board_does_not_have_are_not_monitored() {
     let without = Hardware::SIMULATED;
     let with = Hardware { enable_input: true, ..BOARD };
     let least = f32::MIN_POSITIVE;

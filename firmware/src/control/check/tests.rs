@@ -122,7 +122,7 @@ fn a_watch_or_a_limit_where_the_board_cannot_read_is_refused() {
 }
 
 #[test]
-fn what_cannot_be_used_is_mended_group_by_group_and_the_rest_is_kept() {
+fn unusable_settings_are_replaced_group_by_group_and_the_rest_is_kept() {
     let mut settings = Settings::DEFAULT;
     settings.limits.pressure_pa = 250e3;
     settings.regulator.line_s = 1e30;

@@ -34,7 +34,7 @@ fn a_mode_is_vent_until_it_is_started_and_again_when_it_is_stopped() {
 fn force_needs_a_table_unless_it_is_only_fed_back() {
     let mut fed_back = ready(|settings| settings.feed_forward = FeedForward::Off);
     assert_eq!(fed_back.controller.start(Mode::Force, OWNER), Ok(()));
-    // No pressure is known for a force: nothing is commanded, and that is no fault.
+    // No pressure is known for a force: nothing is commanded, and that is not a fault.
     assert_eq!(fed_back.controller.set_point(sent(SetPoint::Force(20.0))), Ok(()));
     fed_back.pass(50);
     assert_eq!((fed_back.controller.state(), fed_back.last.sides[0].pressure_pa), (State::Running, 0.0));
@@ -77,7 +77,7 @@ fn an_armed_device_disarms_in_the_tick_after_its_time() {
 }
 
 #[test]
-fn nobody_needs_to_keep_alive_what_is_vented() {
+fn a_vented_muscle_needs_no_keep_alive() {
     let mut vents = ready(|_| ());
     assert_eq!(vents.controller.start(Mode::Vent, OWNER), Ok(()));
     vents.hears_host = false;

@@ -96,7 +96,7 @@ fn supply_air_below_its_least_pressure_is_a_fault_from_arming_on() {
     assert_eq!(bench.latched(), Some(Fault::SupplyPressureLow));
     let mut missing = Bench::new(watched);
     missing.pass(300);
-    assert_eq!(missing.latched(), None, "disarmed, without air, is no fault");
+    assert_eq!(missing.latched(), None, "disarmed, without air, is not a fault");
     assert_eq!(missing.controller.arm(OWNER), Ok(()));
     missing.pass(1);
     assert_eq!(missing.latched(), Some(Fault::SupplyPressureLow));

@@ -139,7 +139,7 @@ fn a_joint_starts_where_it_is() {
 }
 
 #[test]
-fn what_a_joint_cannot_have_is_refused() {
+fn unreachable_angles_and_stiffnesses_are_refused() {
     let mut joint = Joint::new(None, |_| ()).start();
     let stiffness = joint.middle(0.0);
     let [low, high] = joint.stiffnesses(0.0);
@@ -226,7 +226,7 @@ fn a_stiffness_that_the_torque_leaves_no_room_for_is_counted_as_saturated() {
     joint.pass(100);
     assert_eq!(joint.bench.controller.saturated_ticks(), before + 200, "both muscles in each tick");
     let [first, second] = joint.forces_n();
-    assert!(first < 100.0 && second > 1.0, "the forces can be had: {first} and {second}");
+    assert!(first < 100.0 && second > 1.0, "the forces can be reached: {first} and {second}");
 }
 
 #[test]

@@ -28,7 +28,7 @@ fn a_sample_is_due_every_n_ticks_and_none_without_a_rate() {
 }
 
 #[test]
-fn a_tick_says_what_is_demanded_and_at_what_level_the_outputs_are() {
+fn a_tick_reports_the_demand_and_the_levels_of_the_outputs() {
     let mut bench = Bench::running(|settings| settings.feed_forward = FeedForward::Off);
     assert_eq!((bench.last.state, bench.last.setpoint), (State::Running, 0.0), "no force is demanded");
     let part = bench.controller.settings().command.part(bench.last.sides[0].pressure_pa);
@@ -41,7 +41,7 @@ fn a_tick_says_what_is_demanded_and_at_what_level_the_outputs_are() {
 }
 
 #[test]
-fn a_trace_has_the_variables_of_each_tick_and_says_when_it_is_full() {
+fn a_trace_has_the_variables_of_each_tick_and_reports_when_it_is_full() {
     use Variable::*;
     let mut bench = Bench::running(|_| ());
     while bench.controller.take_event().is_some() {}

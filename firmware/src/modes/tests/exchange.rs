@@ -34,7 +34,7 @@ fn a_seat_holds_the_last_table_that_could_be_used() {
 }
 
 #[test]
-fn a_table_that_is_exchanged_begins_anew() {
+fn the_state_of_an_exchanged_table_restarts() {
     let rubbing = with(EffectName::CoulombFriction, &[2.0, 2.0]);
     let mut model = shortened(&rubbing, 2e-3, 400e3);
     for _ in 0..300 {
@@ -44,7 +44,7 @@ fn a_table_that_is_exchanged_begins_anew() {
     model.rebuild(&table::example()).expect("a table");
     let mut fresh = built(&table::example());
     assert_eq!((model.direction(), model.slope()), (fresh.direction(), fresh.slope()));
-    // A first reading far from the last one of the table before is no travel.
+    // A first reading far from the last one of the table before is not travel.
     for (stroke_m, pressure_pa) in [(0.0, 100e3), (1e-6, 100e3), (3e-6, 110e3), (2e-5, 120e3)] {
         let found =
             [&mut model, &mut fresh].map(|one| (one.tick(&at(stroke_m), pressure_pa), one.direction()));

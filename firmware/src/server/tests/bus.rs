@@ -81,7 +81,7 @@ impl Bus {
         }
     }
 
-    /// Every device sees every message; gives what they send, but for the message of this number.
+    /// Every device sees every message; gives what they send, except the message of this number.
     fn carry(&mut self, sent: &[Message], lost: Option<usize>) -> Vec<Message> {
         let mut answers = Vec::new();
         for message in sent {
@@ -182,7 +182,7 @@ fn one_message_vents_all(format: Format) {
 }
 
 #[test]
-fn an_answer_that_lost_a_message_is_asked_for_again() {
+fn an_answer_that_lost_a_message_is_requested_again() {
     [Format::Fd, Format::Classic].into_iter().for_each(each_is_asked_for_again);
 }
 

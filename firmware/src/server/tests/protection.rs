@@ -144,7 +144,7 @@ fn an_armed_device_is_not_restarted() {
 }
 
 #[test]
-fn pieces_end_where_the_upload_was_said_to_end() {
+fn pieces_end_at_the_stated_end_of_the_upload() {
     let shared = Shared::new(Settings::default());
     let mut server = started(MockFlash::erased(), &shared);
     let piece = |offset, length: usize| TablePiece {
@@ -280,7 +280,7 @@ fn a_start_after_the_watchdog_or_a_brown_out_is_a_latched_fault() {
 }
 
 #[test]
-fn what_effects_remember_is_kept_at_rest_and_before_a_restart() {
+fn memories_of_effects_are_stored_at_rest_and_before_a_restart() {
     let work = |shared: &Shared, by: f32| {
         shared.with(|controller| {
             let model = controller.model_mut(Side::Agonist).expect("a table");

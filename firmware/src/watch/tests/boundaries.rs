@@ -38,7 +38,7 @@ fn wide() -> Settings {
 }
 
 #[test]
-fn what_is_at_a_limit_is_not_beyond_it() {
+fn a_value_at_a_limit_is_not_beyond_it() {
     let settings = wide();
     let limits = settings.limits;
     let speed = |speed_m_per_s| Seen { speed_m_per_s, ..still(200e3, 0.0, 0.0) };
@@ -88,7 +88,7 @@ fn a_change_as_large_as_the_bound_is_no_jump() {
         |change: f32| (0..40).map(move |tick| still(200e3, 0.0, if tick % 2 == 0 { 0.0 } else { change }));
     assert_eq!(all(alternating(100.0), &settings), []);
     let (tick, finding) = all(alternating(100.5), &settings)[0];
-    // The first reading is no jump.
+    // The first reading is not a jump.
     assert_eq!(
         (tick, finding.fault, finding.limit),
         (u32::from(settings.watch.noisy_jumps) + 1, Fault::SensorNoisy, 100.0)
@@ -147,7 +147,7 @@ fn a_muscle_is_not_vented_from_the_tick_after_its_time_on() {
         (time + 2, Fault::NotVented, vented),
         "two ticks beyond the time"
     );
-    // A command in between begins the time anew.
+    // A command in between restarts the time.
     let mut interrupted = vec![seen(vented + 1.0); ticks];
     interrupted[time as usize - 5].command.vent = false;
     assert_eq!(all(interrupted, &settings), []);
@@ -207,7 +207,7 @@ fn a_restart_forgets_what_was_counted_but_not_how_long_the_muscle_has_been_vente
 }
 
 #[test]
-fn table_and_load_cell_may_be_apart_by_as_much_as_the_bound() {
+fn table_and_load_cell_may_differ_by_the_bound() {
     let mut settings = wide();
     settings.watch.disagree_n = 10.0;
     let apart = |by: f32| Seen { model_n: Some(40.0 + by), ..still(200e3, 0.0, 40.0) };
@@ -220,7 +220,7 @@ fn table_and_load_cell_may_be_apart_by_as_much_as_the_bound() {
 }
 
 #[test]
-fn one_good_tick_begins_every_count_anew() {
+fn one_good_tick_restarts_every_count() {
     let mut settings = wide();
     settings.watch.follow_ticks = 3;
     settings.watch.debounce_ticks = 3;
@@ -228,7 +228,7 @@ fn one_good_tick_begins_every_count_anew() {
     let follow = settings.watch.follow_pa;
     let apart = |miss: f32| Seen { expected_pa: 200e3, ..still(200e3 + miss, 0.0, 0.0) };
     let full = Seen { command: Command::VENT, ..still(settings.watch.vented_pa + 1.0, 0.0, 0.0) };
-    // At the limit: no pressure from which the time would begin anew.
+    // At the limit: no pressure from which the time would restart.
     let empty = Seen { command: Command::VENT, ..still(settings.watch.vented_pa, 0.0, 0.0) };
     let good = still(200e3, 0.0, 0.0);
     let cases = [
@@ -272,7 +272,7 @@ fn the_higher_of_two_pressure_sensors_is_judged_while_both_are_watched() {
 }
 
 #[test]
-fn two_watches_that_count_alike_are_both_reported_and_both_begin_anew_in_a_good_tick() {
+fn two_watches_with_equal_counts_are_both_reported_and_both_restart_in_a_good_tick() {
     let settings = wide();
     let limits = settings.limits;
     let good = still(200e3, 0.0, 0.0);

@@ -10,7 +10,7 @@ use crate::journal::{Chosen, Event, Journal};
 /// A recording has at least this many rows.
 const FEWEST_ROWS: u64 = 20;
 
-/// Teaches an engine what the log of an earlier program holds; gives the course and the bench time so far.
+/// Gives an engine what the log of an earlier program holds; gives the course and the bench time so far.
 pub(super) fn resume(
     engine: &mut Engine,
     journal: &Journal,

@@ -24,7 +24,7 @@ pub struct Planned {
     pub step: Step,
     /// Why, in one sentence.
     pub why: String,
-    /// What it is expected to tell after those before it, nats.
+    /// Expected information after those before it, nats.
     pub gain: Gain,
     /// Bench time, s.
     pub seconds: f64,
@@ -33,7 +33,7 @@ pub struct Planned {
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Steps in the order of recording: each tells most per second after those before it.
+    /// Steps in the order of recording: each has the most information per second after those before it.
     pub steps: Vec<Planned>,
     /// Why it ends there, in one sentence.
     pub ends: String,
@@ -42,7 +42,7 @@ pub struct Plan {
 }
 
 impl Engine {
-    /// What recordings that exist already tell: of any protocol, made by anyone.
+    /// What recordings that exist already show: of any protocol, made by anyone.
     ///
     /// # Errors
     /// See [`Engine::new`] and [`Engine::diagnose`].

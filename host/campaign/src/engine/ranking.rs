@@ -1,4 +1,4 @@
-//! The steps of the menu by what they are expected to tell per second: one ranking for campaigns and for plans.
+//! The steps of the menu by the information expected per second: one ranking for campaigns and for plans.
 
 use std::borrow::Cow;
 
@@ -17,26 +17,26 @@ use crate::purpose::Purpose;
 use crate::step::Step;
 use crate::wording;
 
-/// A step and what it is expected to tell.
+/// A step and its expected information.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weighed {
     /// The step.
     pub step: Step,
-    /// What it is expected to tell, nats.
+    /// Expected information, nats.
     pub gain: Gain,
     /// Bench time that it takes, s.
     pub seconds: f64,
 }
 
 impl Weighed {
-    /// What it is expected to tell per second of bench time, nats/s.
+    /// Expected information per second of bench time, nats/s.
     #[must_use]
     pub fn rate(&self) -> f64 {
         self.gain.total() / self.seconds.max(1.0)
     }
 }
 
-/// The menu, weighed.
+/// The menu, ranked.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ranking {
     /// Steps that are worth their time, best first.
@@ -50,7 +50,7 @@ pub struct Ranking {
 impl Engine {
     /// Ranks the steps that fit into the time left, as if `planned` had been made already: each with the recording that is expected of it.
     ///
-    /// Before there is a table nothing can be weighed: then the steps that were not made come in the order of the menu.
+    /// Before there is a table nothing can be ranked: then the steps that were not made come in the order of the menu.
     #[must_use]
     pub fn rank(&self, left_s: f64, planned: &[(Step, Option<Recording>)]) -> Ranking {
         // Weighing settles only what the diagnosis must have named: the recordings show every constant force at the tares.

@@ -268,7 +268,7 @@ mod tests {
             remark(30.0, 7.5)
                 .starts_with("the clock of `a` pauses for 30 s at 4.90 s, and the length changes by 7.50 mm")
         );
-        // Lost rows during a motion, and a pause at one length, are no runs.
+        // Lost rows during a motion, and a pause at one length, are not runs.
         assert_eq!((remark(1.0, 7.5), remark(30.0, 0.0)), (String::new(), String::new()));
     }
 

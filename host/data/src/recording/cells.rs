@@ -132,7 +132,7 @@ impl Parsed {
         self.skipped.push(self.rows);
     }
 
-    /// As [`Self::leave_out`], of a line that is no row.
+    /// As [`Self::leave_out`], of a line that is not a row.
     fn take_back(&mut self) {
         self.numbers.iter_mut().for_each(|n| n.truncate(self.rows));
         self.texts.iter_mut().for_each(|t| t.codes.truncate(self.rows));
@@ -301,7 +301,7 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
     (Some(index), text.into_owned(), fault)
 }
 
-/// Why a cell is no time stamp.
+/// Why a cell is not a time stamp.
 fn explain_stamp(cells: Cells<'_>, width: usize, index: usize) -> CellError {
     let (cell, value, fault) = explain(cells, width, index);
     let fault = if fault == Fault::NotANumber { Fault::NotAStamp } else { fault };

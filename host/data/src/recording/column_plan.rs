@@ -267,7 +267,7 @@ fn usual(names: &[String], quantity: Quantity) -> Result<Usual<'_>> {
 fn unknown_unit(quantity: Quantity, name: &str) -> Error {
     let usual = usual_name(name);
     let cause = match usual.strip_prefix(quantity.name()) {
-        Some("") => format!("the column `{name}` does not say its unit"),
+        Some("") => format!("the column `{name}` has no unit"),
         Some(unit) => format!("unknown unit `{}` of {}", unit.trim_start_matches('_'), quantity.name()),
         None => format!("unknown unit of {}", quantity.name()),
     };
@@ -302,7 +302,7 @@ fn missing(what: &str, headers: impl Iterator<Item = String>, names: &[String]) 
             [(';', "semicolons"), ('|', "bars"), (' ', "blanks")].iter().find(|d| only.contains(d.0))
     {
         help = format!(
-            "the cells seem to be separated by {}; use commas or tabs, or say so in an import description (--import)",
+            "the cells seem to be separated by {}; use commas or tabs, or state it in an import description (--import)",
             delimiter.1
         );
     } else if let Some((name, near)) = near {

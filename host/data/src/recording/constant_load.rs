@@ -2,7 +2,7 @@
 //!
 //! While the pressure is too low to lift the load, a stop or the taut braid carries a part of it: the length stays, the pressure changes, and
 //! the force that is read is not the muscle's. At the other end of the stroke friction holds the muscle until the pressure has fallen enough.
-//! Both say nothing about the force at that pressure, and are excluded.
+//! Neither shows the force at that pressure, and both are excluded.
 
 use std::ops::Range;
 

@@ -4,7 +4,7 @@
 //! F ≈ p (a0 + a1 u + a2 u² + a3 u³) + b0 + b1 u + b2 u² + b3 u³
 //! ```
 //! with `p` and `u` pressure and stroke as shares of their ranges, `a` and `b` in N. A muscle's force is linear in pressure at
-//! constant length, and smooth in length: a cubic is enough to tell a wrong unit or a dead sensor from a muscle. It is no model of
+//! constant length, and smooth in length: a cubic is enough to distinguish a wrong unit or a dead sensor from a muscle. It is not a model of
 //! the muscle; that is the fit's.
 
 use nalgebra::{SMatrix, SVector};

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 
 /// A recording is at most this many groups deep.
 const DEEPEST: usize = 4;
-/// Groups and data sets that are looked at. A recording has some dozens; a few links from a group to itself make millions of a small file.
+/// Groups and data sets that are read. A recording has some dozens; a few links from a group to itself make millions of a small file.
 const MEMBERS: usize = 10_000;
 
 /// The columns of a file.
@@ -40,7 +40,7 @@ struct Found {
     /// MATLAB stores column by column, so that its dimensions appear in reverse.
     matlab: bool,
     budget: Budget,
-    /// Groups and data sets that may still be looked at.
+    /// Groups and data sets that may still be read.
     left: usize,
 }
 

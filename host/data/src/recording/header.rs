@@ -211,7 +211,7 @@ mod tests {
 
     /// The same readings as other programs write them: what is certain needs no import description.
     #[test]
-    fn what_spreadsheets_and_laboratory_programs_write_is_read() {
+    fn files_of_spreadsheets_and_laboratory_programs_are_read() {
         let rows = |delimiter: &str, comma: bool, end: &str| {
             (0..20).fold(String::new(), |mut text, i| {
                 let cells = [0.01 * f64::from(i), 300.125, 0.5 + 0.125 * f64::from(i), 40.5].map(|v| {

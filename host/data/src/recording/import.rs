@@ -258,7 +258,7 @@ impl Import {
         })
     }
 
-    /// The character that begins a remark; `None` for one that is no single byte.
+    /// The character that begins a remark; `None` for one that is not a single byte.
     pub(super) fn comment_byte(&self) -> Option<u8> {
         self.comment.and_then(|c| u8::try_from(c).ok())
     }
@@ -337,7 +337,7 @@ pub(super) fn constant(name: &str) -> Result<(Quantity, Unit)> {
         .flat_map(|q| q.headers().zip(q.units()).map(move |(header, unit)| (header, q, *unit)))
         .find_map(|(header, quantity, unit)| (header == name).then_some((quantity, unit)))
         .ok_or_else(|| {
-            Error::new(DataCode::ImportInvalid, format!("`{name}` is no quantity with a unit"))
+            Error::new(DataCode::ImportInvalid, format!("`{name}` is not a quantity with a unit"))
                 .help("write it as in a header, for example pressure_kPa or rest_length_mm")
         })
 }

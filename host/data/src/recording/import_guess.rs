@@ -97,7 +97,7 @@ pub struct GuessedPattern {
 pub struct Guess {
     /// The file's name.
     pub file: String,
-    /// Rows that were looked at, and whether these are all.
+    /// Rows that were read, and whether these are all.
     pub rows: usize,
     /// See `rows`.
     pub whole: bool,
@@ -123,7 +123,7 @@ pub struct Guess {
     pub split_by: Vec<String>,
     /// Whether a run begins where the time goes back.
     pub new_run_by_clock: bool,
-    /// How many recordings stand side by side, and how many columns are from one to the next.
+    /// How many recordings are side by side, and how many columns are from one to the next.
     pub side_by_side: Option<(usize, usize)>,
     /// Columns that were understood.
     pub columns: Vec<GuessedColumn>,

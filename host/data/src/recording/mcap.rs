@@ -139,7 +139,7 @@ impl Samples {
         let foreign = || {
             Error::new(
                 DataCode::RecordingContainer,
-                format!("message {} of {TOPIC} is no JSON object", self.rows + 1),
+                format!("message {} of {TOPIC} is not a JSON object", self.rows + 1),
             )
             .help("only files of `host record` are read; take columns from others by their own tools as CSV")
         };

@@ -11,7 +11,7 @@
 //! | `turning` | reversals, and the sample at which each begins |
 //! | `holding` | where the length is held |
 //! | `columns` | travel and time since a reversal, time at rest, cycles |
-//! | `state` | what each sample tells: held, in doubt, on a ramp |
+//! | `state` | what each sample shows: held, in doubt, on a ramp |
 //! | `rates` | speed, acceleration, pressure rate |
 //!
 //! The direction of friction is the sign of the speed while the muscle moves. While its length is held, it is the way the pressure
@@ -109,7 +109,7 @@ impl Motion {
         Self::after(recording, least_stroke([recording]), 0)
     }
 
-    /// As [`Motion::of`], where less than `least`, m, is no motion, and the direction before the first sample is known.
+    /// As [`Motion::of`], where less than `least`, m, is not motion, and the direction before the first sample is known.
     fn after(recording: &Recording, least: f64, before: i8) -> Self {
         let (time, stroke, pressure) = (&recording.time, &recording.stroke, &recording.pressure);
         let (scale, smooth) = scale::of_stroke(stroke, least);
@@ -186,7 +186,7 @@ impl Motion {
     }
 }
 
-/// Less than this is no motion, m: a share of the range that the strokes have, without their few farthest readings.
+/// Less than this is not motion, m: a share of the range that the strokes have, without their few farthest readings.
 fn least_stroke<'a>(recordings: impl IntoIterator<Item = &'a Recording> + Clone) -> f64 {
     let samples: usize = recordings.clone().into_iter().map(|r| r.stroke.len()).sum();
     let stride = samples / (16 * LEVEL_SAMPLES) + 1;

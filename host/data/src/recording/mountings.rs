@@ -8,7 +8,7 @@ pub const SAME_LENGTH: f64 = 0.5e-3;
 /// An unknown pause between two recordings of one mounting counts as this long, s: someone saves a file and starts the next. The
 /// memories of a muscle span decades of time, of which the recordings themselves are most.
 const ASSUMED_REST: f64 = 5.0;
-/// An unknown pause in which the muscle is mounted anew counts as this long, s. Between 300 and 1000 s the unseen error of eleven real
+/// An unknown pause in which the muscle is remounted counts as this long, s. Between 300 and 1000 s the unseen error of eleven real
 /// muscles changes by about a tenth at most (`trials festo-tables`); an endless pause is worse on most of them.
 const ASSUMED_REMOUNTING: f64 = 600.0;
 /// The time in which a muscle is vented after the last reading, s.
@@ -67,7 +67,7 @@ fn leading_number(name: &str) -> Option<(u64, &str)> {
 }
 
 /// Whether the number at the beginning of the names numbers the recordings: it rises with each of them, also where the rest differs in
-/// the number of the run alone. Then it says nothing of the mounting.
+/// the number of the run alone. Then it does not show the mounting.
 fn are_numbered(recordings: &[Recording]) -> bool {
     let names: Option<Vec<(u64, &str)>> = recordings.iter().map(|r| leading_number(&r.name)).collect();
     let names = names.unwrap_or_default();
@@ -164,7 +164,7 @@ mod tests {
         let named = ["short7_run1.csv", "short7_run2.csv", "short9-run1.csv", "short9-run2.csv.gz"]
             .map(|n| run(n, 0.0, times, &[]));
         assert_eq!(of(named.to_vec()), Some(vec![0, 0, 1, 1]));
-        // A number that rises with every recording is no mounting.
+        // A number that rises with every recording is not a mounting.
         let numbered = ["08_a_run1.csv", "09_a_run2.csv", "10_b_run1.csv", "11_b_run2.csv"]
             .map(|n| run(n, 0.0, times, &[]));
         assert_eq!(of(numbered.to_vec()), Some(vec![0, 0, 1, 1]));
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(of(mountings.to_vec()), Some(vec![0, 0, 1]));
         let once = ["1_run1.csv", "2_run1.csv", "3_run1.csv"].map(|n| run(n, 0.0, times, &[]));
         assert_eq!(of(once.to_vec()), Some(vec![0, 1, 2]));
-        // Names without a number say nothing.
+        // Names without a number do not show one.
         assert_eq!(of(["a.csv", "b.csv"].map(|n| run(n, 0.0, times, &[])).to_vec()), Some(vec![0, 0]));
         let mut moved = run("r.csv", 0.0, times, &[]);
         moved.stroke[2] = 2e-3;

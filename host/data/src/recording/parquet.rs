@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_stands_in_every_row_is_counted_in_every_row() {
+    fn a_text_in_every_row_is_counted_in_every_row() {
         let few = columns(repeated("load", 1_000)).expect("columns");
         assert!(matches!(&few[0].1, Column::Texts(texts) if texts.len() == 1_000));
         let file = repeated(&"x".repeat(1 << 20), 1_000);

@@ -155,7 +155,7 @@ pub(super) fn usual_name(header: &str) -> String {
         None if header.eq_ignore_ascii_case(Quantity::PressureCommand.name()) => (header, ""),
         None => header.rsplit_once('_').unwrap_or((header, "")),
     };
-    // Of temperatures only: `µm` is no metre, whatever became of its first sign.
+    // Of temperatures only: `µm` is not a metre, whatever became of its first sign.
     let degrees = unit.trim_start_matches(['°', 'º', '\u{fffd}']);
     let degrees = degrees.strip_prefix("deg").map_or(degrees, str::trim_start);
     let unit = if ["C", "K"].contains(&degrees) { degrees } else { unit };
@@ -180,7 +180,7 @@ pub(super) fn usual_name(header: &str) -> String {
 pub fn named(header: &str) -> Named {
     let usual = usual_name(header);
     let known = Quantity::IN_HEADERS.into_iter().filter_map(|q| {
-        // `pressure_command_kPa` is no pressure in `command_kPa`: a unit has no underscore.
+        // `pressure_command_kPa` is not a pressure in `command_kPa`: a unit has no underscore.
         let unit = usual.strip_prefix(q.name())?;
         if unit.is_empty() {
             Some((q, ""))
@@ -201,7 +201,7 @@ pub fn named(header: &str) -> Named {
     {
         return Named::Known(*quantity, unit);
     }
-    // The longest name: a bare `pressure_command` is no pressure in `command`.
+    // The longest name: a bare `pressure_command` is not a pressure in `command`.
     match known.max_by_key(|(q, _)| q.name().len()) {
         Some((quantity, unit)) => {
             quantity.unit(unit).map_or(Named::UnknownUnit(quantity), |u| Named::Known(quantity, u))

@@ -1,8 +1,8 @@
 //! Sensors that fail: a reading that does not change, stops at the end of its range, is dead, or drops out.
 //!
-//! A failing sensor is no physics of a muscle, but a model would name it as such. It is found from two properties together. The
+//! A failing sensor is not physics of a muscle, but a model would name it as such. It is found from two properties together. The
 //! reading is constant, or steps away and back within one row each. And force, pressure and stroke of these rows contradict the surface
-//! of force over pressure and stroke that the other rows of the campaign have in common. A constant reading alone is no fault: a regulated
+//! of force over pressure and stroke that the other rows of the campaign have in common. A constant reading alone is not a fault: a regulated
 //! pressure and a held length are constant.
 //!
 //! | fault | reading | contradiction | file |

@@ -20,7 +20,7 @@ const UTF_16_BIG: [u8; 2] = [0xfe, 0xff];
 /// An open file, read from its beginning.
 pub(super) struct Source {
     pub reader: Box<dyn Read + Send>,
-    /// Size of the text if it is known beforehand, bytes.
+    /// Size of the text if it is known in advance, bytes.
     pub size: Option<u64>,
     /// The first bytes of the file itself, before any decompression.
     pub magic: Vec<u8>,
@@ -108,7 +108,7 @@ impl Read for Bytes {
     }
 }
 
-/// UTF-16 as UTF-8, as it is read. What is no character becomes the sign for that.
+/// UTF-16 as UTF-8, as it is read. What is not a character becomes the sign for that.
 struct Utf16 {
     units: Box<dyn Read + Send>,
     big_endian: bool,
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn utf_16_is_read_whole_however_it_comes_and_is_asked_for() {
+    fn utf_16_is_read_whole_in_pieces_of_any_size() {
         let text = "time_s\t°C\t\u{1d53d}\u{20ac}\n".repeat(40);
         for big_endian in [false, true] {
             let bytes = |u: u16| if big_endian { u.to_be_bytes() } else { u.to_le_bytes() };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::statistics::median;
 
-/// What lasts as many rows is no spike.
+/// What lasts as many rows is not a spike.
 pub(super) const LONGEST: usize = 4;
 /// The row after differs from the row before by less than this share of the step, beyond what was to be expected.
 pub(super) const BACK: f64 = 0.25;

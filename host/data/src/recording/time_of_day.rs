@@ -5,7 +5,7 @@ const DAY: f64 = 86_400.0;
 /// A step from one day to the next is at most this long, s: a recording has no longer pause.
 const STEP: f64 = 3600.0;
 
-/// Adds a day to times of day wherever they pass midnight, s = seconds · scale + offset; gives the rows at which they do. Dates are no times
+/// Adds a day to times of day wherever they pass midnight, s = seconds · scale + offset; gives the rows at which they do. Dates are not times
 /// of day, and a longer step back is none of a clock that continues: both stay as they are.
 pub(super) fn past_midnight(times: &mut [f64], scale: f64, offset: f64) -> Vec<usize> {
     let of_day = |t: &f64| (0.0..DAY).contains(&((t - offset) / scale)) || t.is_nan();

@@ -115,7 +115,7 @@ impl Client {
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,
             Err(e) => {
-                // Another program often hangs up on bytes that it does not understand: what it sent before tells more.
+                // Another program often hangs up on bytes that it does not understand: what it sent before shows more.
                 return Err(if heard.bytes > 0 { heard.error(&self.port) } else { lost(&self.port, &e) });
             }
         };

@@ -99,7 +99,7 @@ pub fn refused(request: &str, refusal: Refusal) -> Error {
     Error::new(DeviceCode::DeviceRefused, format!("the device refuses `{request}`: {why}")).help(help)
 }
 
-/// The error of a program that asks for what belongs to another one.
+/// The error of a program that requests what belongs to another one.
 #[must_use]
 pub fn in_use(request: &str) -> Error {
     Error::new(

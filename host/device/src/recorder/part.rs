@@ -137,7 +137,7 @@ mod tests {
                 programs.into_iter().filter_map(|program| program.join().unwrap()).collect()
             });
             assert!(got.len() <= 1, "round {round}: {got:?}");
-            // Where all were in each other's way, none got it, and the next round begins anew.
+            // Where all were in each other's way, none got it, and the next round restarts.
             if let Some(text) = got.first() {
                 assert_eq!(&std::fs::read_to_string(&path).unwrap(), text);
             }
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_cut_off_is_whole_again_and_replaces_nothing() {
+    fn a_cut_recording_is_completed_and_replaces_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.csv");
         std::fs::write(&path, "an earlier recording\n").unwrap();

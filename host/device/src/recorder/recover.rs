@@ -64,7 +64,7 @@ impl Recovered {
 pub fn recover(path: &Path) -> Result<Recovered> {
     let unreadable = |e: std::io::Error| Error::unreadable(path, &e);
     let unwritable = |e: std::io::Error| Error::unwritable(path, &e);
-    // Writing is needed by nothing but the lock of some systems.
+    // Writing is needed only by the lock of some systems.
     let file = OpenOptions::new().read(true).write(true).open(path).or_else(|_| File::open(path));
     let file = file.map_err(unreadable)?;
     if !file.metadata().map_err(unreadable)?.is_file() {

@@ -42,10 +42,10 @@ pam_data::criteria! {
     /// Time after the last row until a muscle counts as vented.
     VENT_TIME: f64 = 2.0, "t_v", "s", Derived("emptying of the last pulse");
     /// Vented time between an earlier load and the first run.
-    VENTED_BEFORE: f64 = 30.0, "t_0", "s", Derived("change of a mounting; weakly known");
-    /// Below this number of runs pause and earlier load are chosen anew in every fold; with more runs one run does not decide them.
+    VENTED_BEFORE: f64 = 30.0, "t_0", "s", Derived("change of a mounting; uncertain");
+    /// Below this number of runs pause and earlier load are chosen again in every fold; with more runs one run does not decide them.
     NESTED_RUNS: f64 = 20.0, "n_n", "1", Cost;
-    /// Of more runs, every so many-th is left out together (delete-a-group jackknife); a standard error by 40 groups is itself known to 11 %.
+    /// Of more runs, every n-th is left out together (delete-a-group jackknife); a standard error by 40 groups is itself known to 11 %.
     MOST_FOLDS: f64 = 40.0, "n_f", "1", Cost;
     /// A row is supported when another run of the mounting reaches its pressure less this.
     SUPPORT: f64 = 10.0, "ΔP_s", "kPa", Derived("half a pulse");
@@ -103,7 +103,7 @@ pam_data::criteria! {
     SHORTENED: f64 = 5e-3, "ε_s", "1", Derived("1 mm of 200 mm");
     /// Time constants of the memory, one a decade. The upper end is not identifiable beyond 1000 s.
     TIMES: ([f64; 5]) = [1.0, 10.0, 100.0, 1e3, 1e4], "tau_k", "s", Measured("one state alone is worse: 0.485 against 0.312 % of the largest force, mean of eleven muscles");
-    /// Pauses between runs that are tried where the clock does not tell them.
+    /// Pauses between runs that are tried where the clock does not show them.
     PAUSES: ([f64; 4]) = [2.5, 5.0, 12.0, 30.0], "t_p", "s", Judgement;
     /// Times for which the muscle may have been loaded before the first run; longer ones trade against the relaxed share.
     LOADED: ([f64; 3]) = [0.0, 100.0, 1e3], "T_0", "s", Judgement;
@@ -139,7 +139,7 @@ pam_data::criteria! {
     PLACES_CONCENTRATED: f64 = 1.5, "places_concentrated", "1", Judgement;
     /// And when chance gives as much no more often than this.
     PLACES_SURE: f64 = 0.05, "places_sure", "1", Judgement;
-    /// Slopes below this say nothing about a shift, as a share of the largest.
+    /// Slopes below this do not show a shift, as a share of the largest.
     RUN_OFFSET_FLAT: f64 = 0.03, "run_offset_flat", "1", Judgement;
     /// Fewest points from which an offset is taken.
     RUN_OFFSET_LEAST: usize = 5, "run_offset_least", "1", Judgement;
@@ -152,7 +152,7 @@ pam_data::criteria! {
     /// Widths of the contact that are tried in a table.
     TABLE_WIDTHS: ([f64; 3]) = [6e4, 9e4, 1.2e5], "P_c", "Pa", Derived("from the width of the knee at full length to the pressure at which a bladder carries no stress");
     /// Times for which the muscle may have been loaded before a mounting that follows another, half a decade apart: one branch of the memory
-    /// tells no finer.
+    /// is no finer.
     TABLE_LOADED: ([f64; 4]) = [3e1, 1e2, 3e2, 1e3], "T_0", "s", Judgement;
     /// Such a load was not recorded: it is assumed only if it removes this share of the squared error of left-out runs.
     TABLE_LOADED_GAIN: f64 = 0.25, "g_0", "1", Judgement;
@@ -188,7 +188,7 @@ pam_data::criteria! {
     LENGTH_ERROR: f64 = 1e-3, "delta_L", "m", Derived("a tape measure; the bound of a fit of lengths");
     /// Lengths that such a search tries over this range, to both sides.
     LENGTH_STEPS: usize = 17, "n_L", "1", Cost;
-    /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
+    /// Runs that are predicted from the others by tables: of more, every n-th is left out together.
     TABLE_FOLDS: usize = 12, "n_fold", "1", Cost;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;

@@ -14,7 +14,7 @@ pam_data::criteria! {
     MOST_REGIONS: usize = 6, "n_region", "1", Cost;
     /// A region holds less than this share of the rows.
     REGION_ROWS: f64 = 0.85, "q_region", "1", Judgement;
-    /// Variance of a share of rows, at least: a handful of rows is no region.
+    /// Variance of a share of rows, at least: a handful of rows is not a region.
     REGION_VARIANCE: f64 = 0.02, "var_min", "1", Judgement;
     /// Rows each way over which the residual is smoothed.
     REGION_SMOOTHING: usize = 2, "m_region", "1", Judgement;
@@ -31,7 +31,7 @@ pam_data::criteria! {
     /// Stretches of a spectrum, at least.
     STRETCHES: usize = 8, "n_fft", "1", Judgement;
     /// A line's period is at most one of this many parts of a half-stroke.
-    LINE_PERIODS: f64 = 4.0, "t_stroke/T", "1", Derived("what repeats with the strokes themselves is no line");
+    LINE_PERIODS: f64 = 4.0, "t_stroke/T", "1", Derived("what repeats with the strokes themselves is not a line");
     /// Frequencies on each side that a line is compared with.
     LINE_NEIGHBOURS: usize = 10, "m_line", "1", Judgement;
     /// Frequencies on each side that belong to it.

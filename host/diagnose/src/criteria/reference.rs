@@ -50,15 +50,15 @@ pam_data::criteria! {
     PAUSE: f64 = 12.0, "pause", "s", Judgement;
     /// Where the logarithmic clocks of creep begin.
     CREEP_START: f64 = 1.0, "creep_start", "s", Judgement;
-    /// A longer pause on a shared clock, and the actuator counts as mounted anew.
+    /// A longer pause on a shared clock, and the actuator counts as remounted.
     NEW_VISIT: f64 = 3600.0, "new_visit", "s", Judgement;
     /// First-order lags and delays that are tried on the rows of a run.
     LAGS: ([f64; 16]) = [0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0], "lags", "s", Judgement;
     /// How many of them are tried first beside recordings: the others where the longest of these is the best.
     LAGS_FIRST: usize = 13, "lags_first", "1", Cost;
-    /// A row further than this many median intervals from the one before says nothing about lags.
+    /// A row further than this many median intervals from the one before does not show lags.
     LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
-    /// Multiple of the longest lag tried first. Beside a change of friction, rows within that time after a reversal say nothing about lags:
+    /// Multiple of the longest lag tried first. Beside a change of friction, rows within that time after a reversal do not show lags:
     /// e⁻³ of a jump is left.
     LAG_AFTER_TURN: f64 = 3.0, "lag_after_turn", "1", Derived("e^-3 = 5 %");
     /// Residuals of the lag score are clipped at this share of the largest force.
@@ -67,7 +67,7 @@ pam_data::criteria! {
     LAG_FLOOR: f64 = 0.010, "lag_floor", "s", Judgement;
     /// Runs that `LAG_FLOOR` is worth.
     LAG_RUNS: f64 = 4.0, "lag_runs", "1", Judgement;
-    /// The sizes of lags that are equally likely beforehand.
+    /// The sizes of lags that are equally likely a priori.
     LAG_SIZES: ([f64; 5]) = [0.02, 0.05, 0.1, 0.2, 0.4], "lag_sizes", "s", Judgement;
     /// Loss of closed valves: time since the last fast move of the pressure from which on its slope counts.
     LOSS_AFTER: f64 = 0.1, "loss_after", "s", Judgement;
@@ -81,21 +81,21 @@ pam_data::criteria! {
     LOSS_ALIKE_PRESSURE: f64 = 0.05, "loss_alike_pressure", "1", Judgement;
     /// ... and the steps before them by no more than this share: pulses of another length differ by more.
     LOSS_ALIKE_STEP: f64 = 0.2, "loss_alike_step", "1", Measured("pulses of 10 and 5 ms, 30 to 60 ms");
-    /// Share of a run's rests that have a similar one in BEFORE; with fewer the valves were set otherwise, and nothing is said.
+    /// Share of a run's rests that have a similar one in BEFORE; with fewer the valves were set otherwise, and nothing is concluded.
     LOSS_ALIKE_SHARE: f64 = 0.8, "loss_alike_share", "1", Convention("as UPDATE_COVERED");
     /// Similar rests on both sides that a run must have.
     LOSS_RESTS: usize = 6, "loss_rests", "1", Judgement;
-    /// How often the weights of the rests are taken anew.
+    /// How often the weights of the rests are taken again.
     LOSS_REWEIGHTED: usize = 5, "loss_reweighted", "1", Cost;
     /// Slopes further than this many robust deviations from the line count less.
     LOSS_CLIP: f64 = 2.0, "loss_clip", "1", Convention("Huber, two standard deviations");
     /// Spread of the rate between campaigns that is always allowed: 12 kPa in two minutes at 500 kPa.
     LOSS_FLOOR: f64 = 2e-4, "loss_floor", "1/s", Judgement;
-    /// Spread between runs beforehand ...
+    /// Prior spread between runs ...
     LOSS_SPREAD: f64 = 2e-3, "loss_spread", "1/s", Measured("development half, 0.001 to 0.003");
     /// ... and the runs that it is worth.
     LOSS_RUNS: f64 = 4.0, "loss_runs", "1", Judgement;
-    /// The sizes of a change of the rate that are equally likely beforehand: half a minute to half an hour until a third is left.
+    /// The sizes of a change of the rate that are equally likely a priori: half a minute to half an hour until a third is left.
     LOSS_SIZES: ([f64; 4]) = [5e-4, 2e-3, 8e-3, 3.2e-2], "loss_sizes", "1/s", Measured("leak-downs of fluidic muscles, 3e-4 to 1.5e-2");
     /// Variance of a median over that of a mean.
     MEDIAN_VARIANCE: f64 = 1.57, "median_variance", "1", Derived("pi/2");
@@ -113,16 +113,16 @@ pam_data::criteria! {
         cell: 0.10,
         length: 0.277,
         directions: 0.566,
-    }, "repeats", "1", Measured("restricted maximum likelihood on untouched runs of the development half, rounded; floors as said");
-    /// A mounting made anew by tape measure.
+    }, "repeats", "1", Measured("restricted maximum likelihood on untouched runs of the development half, rounded; floors as stated");
+    /// A remounting by tape measure.
     REMOUNT: f64 = 1e-3, "remount", "m", Convention("tape measure, 1 mm");
     /// Observations that the prior scale is worth.
     SCALE_PRIOR: f64 = 10.0, "scale_prior", "1", Judgement;
-    /// Independent directions that a run can teach.
+    /// Independent directions that a run can determine.
     DIRECTIONS_PER_RUN: f64 = 4.0, "directions_per_run", "1", Judgement;
     /// Never believe that this actuator repeats more than √2 better than its class.
     LEAST_SCALE: f64 = 0.5, "least_scale", "1", Judgement;
-    /// Sizes of a change that are equally likely beforehand, share of the largest force rms: heavy-tailed and scale-free over what is of interest; below 1 % a change has no practical effect.
+    /// Sizes of a change that are equally likely a priori, share of the largest force rms: heavy-tailed and scale-free over what is of interest; below 1 % a change has no practical effect.
     SIZES: ([f64; 4]) = [0.01, 0.02, 0.04, 0.08], "sizes", "1", Judgement;
     /// Prior probability that nothing changed: four of five pairs of campaigns.
     PRIOR_NONE: f64 = 0.80, "prior_none", "1", Judgement;
@@ -140,7 +140,7 @@ pam_data::criteria! {
     SET: f64 = 0.95, "set", "1", Convention("95 %");
     /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
-    /// Error of the whole shape of a change that is named already, share of its size: what it leaves is no evidence of another one.
+    /// Error of the whole shape of a change that is named already, share of its size: what it leaves is not evidence of another one.
     NAMED_SHAPE_ERROR: f64 = 0.1, "named_shape_error", "1", Judgement;
     /// The same for a step within AFTER beside a table, by the slope that AFTER shows, which the step itself has altered.
     OWN_SLOPE_ERROR: f64 = 0.15, "own_slope_error", "1", Judgement;
@@ -155,11 +155,11 @@ pam_data::criteria! {
     /// Prior probability that a change was there from the beginning of AFTER: four of five, as for no change at all. A step and a ramp
     /// within AFTER share the rest.
     COURSE_WHOLE: f64 = 0.8, "course_whole", "1", Judgement;
-    /// A change that began outside this part of AFTER has too little on one side to tell its course.
+    /// A change that began outside this part of AFTER has too little on one side to determine its course.
     COURSE_PART: ((f64, f64)) = (0.03, 0.97), "course_part", "1", Judgement;
     /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
     COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
-    /// Pairs of changes that are weighed in full where one name leaves something, the likeliest first.
+    /// Pairs of changes that are tested in full where one name leaves something, the likeliest first.
     PAIRS_TRIED: usize = 3, "pairs_tried", "1", Cost;
     /// Names in one answer, at most.
     MOST_CHANGES: usize = 3, "most_changes", "1", Cost;
@@ -174,7 +174,7 @@ pam_data::criteria! {
     /// Two recordings that share this part of the smaller one's rows in motion overlap: rows in motion agree by chance in far fewer.
     SHARED_ROWS: f64 = 0.1, "shared_rows", "1", Judgement;
     /// Recordings that reach over this share of the pressures and of the contractions that a table was tested at are a campaign: the table is
-    /// fitted anew to them.
+    /// fitted again to them.
     UPDATE_COVERED: f64 = 0.8, "update_covered", "1", Judgement;
     /// Pressures, or lengths, of such a campaign.
     UPDATE_LEVELS: usize = 3, "update_levels", "1", Derived("a curve over the pressure");
@@ -188,7 +188,7 @@ pam_data::criteria! {
     UNSEEN_LEAST: f64 = 0.1, "unseen_least", "1", Convention("as FURTHER_SHARE of the forward selection");
     /// The same from which on the names explain the difference; below it they explain a part.
     UNSEEN_EXPLAINED: f64 = 0.5, "unseen_explained", "1", Convention("the larger part");
-    /// The residual of the names, or a difference that mounting anew excuses, stands out above this many times what untouched recordings differ by.
+    /// The residual of the names, or a difference that remounting explains, stands out above this many times what untouched recordings differ by.
     STANDS_OUT: f64 = 2.0, "stands_out", "1", Convention("two standard deviations");
     /// With a difference that suspects another actuator, names that leave more than this share of the largest force are withdrawn.
     LEFT_BY_NAMES: f64 = 0.1, "left_by_names", "1", Judgement;
@@ -242,7 +242,7 @@ pam_data::criteria! {
     STROKES_RUN_IN: usize = 4, "strokes_run_in", "1", Judgement;
     /// Error of a table that states none, share of the largest force: what tables of fluidic muscles state.
     UNSTATED_ERROR: f64 = 0.02, "unstated_error", "1", Measured("tables of the development half, 0.01 to 0.02");
-    /// Error of a table in the compared cells over its stated rms error, each as likely as the others beforehand: rows are not spread
+    /// Error of a table in the compared cells over its stated rms error, each as likely as the others a priori: rows are not spread
     /// evenly over the cells.
     TABLE_ERROR_FACTORS: ([f64; 4]) = [1.0, 1.5, 2.25, 3.4], "table_error_factors", "1", Measured("development half, 0.9 to 2.4");
     /// Share of the variance of a table's error that all lengths have in common.
@@ -278,7 +278,7 @@ pam_data::criteria! {
     CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
     /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
     CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
-    /// How inexact the law of an effect may be, share of its trace in each state, each as likely as the others beforehand: from a law that is
+    /// How inexact the law of an effect may be, share of its trace in each state, each as likely as the others a priori: from a law that is
     /// nearly exact to one that is good to a fifth. A difference that no law describes better has no name.
     CATALOGUE_LAW_ERRORS: ([f64; 3]) = [0.05, 0.1, 0.2], "catalogue_law_errors", "1", Judgement;
     /// How inexact it usually is. Laws whose traces differ by less are not distinguished.

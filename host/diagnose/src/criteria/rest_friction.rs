@@ -24,7 +24,7 @@ pam_data::criteria! {
     NEARBY_FACTORS: ([[f64; 4]; 2]) = [[0.7, 0.87, 1.15, 1.4], [0.9, 0.95, 1.05, 1.1]], "f", "1", Derived("halves the grid's distances twice");
     /// A row rests from this time after the last motion.
     RESTING_AFTER: f64 = 1.0, "t_rest", "s", Judgement;
-    /// Rest friction is looked at where more than one of this many rows rest.
+    /// Rest friction is examined where more than one of this many rows rest.
     RESTING_ROWS: usize = 50, "1/q_rest", "1", Judgement;
     /// A hold has more rows than this.
     HOLD_ROWS: usize = 4, "N_hold", "1", Judgement;
@@ -52,7 +52,7 @@ pam_data::criteria! {
     STEP_BESIDE: usize = 5, "m_beside", "1", Judgement;
     /// Rows before a step soon after a hold's beginning, at least.
     STEP_BEFORE: usize = 2, "m_before", "1", Judgement;
-    /// A hold with ramps is looked at from this many rows on at which the muscle pulls.
+    /// A hold with ramps is examined from this many rows on at which the muscle pulls.
     RAMP_ROWS: usize = 50, "N_ramp", "1", Derived("eight rows for each of the six numbers that are fitted to a hold");
     /// Changes of pressure that static friction carries on a ramp, half-widths of the play that are tried.
     RAMP_CARRIED: ([f64; 3]) = [0.0, 1.0e3, 3.0e3], "h_ramp", "Pa", Judgement;

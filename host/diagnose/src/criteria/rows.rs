@@ -22,9 +22,9 @@ pam_data::criteria! {
     SMOOTHED_QUANTILE: f64 = 1.645, "z_line", "1", Convention("95 %");
     /// Spikes are mentioned where they are more than one of this many readings.
     SPIKES_MENTIONED: usize = 200, "1/q_spike", "1", Judgement;
-    /// Below this share of the largest force the muscle carries no load: a repeated reading is no end of the sensor's range, a row may be slack.
+    /// Below this share of the largest force the muscle carries no load: a repeated reading is not an end of the sensor's range, a row may be slack.
     NO_LOAD: f64 = 0.02, "F_0/F_max", "1", Judgement;
-    /// The muscle is slack where, besides, the model gives less than this share of the largest force.
+    /// For a slack muscle the model must also give less than this share of the largest force.
     SLACK_MODEL: f64 = 0.015, "F_slack/F_max", "1", Judgement;
     /// Slack rows are mentioned where they are more than one of this many rows.
     SLACK_MENTIONED: usize = 100, "1/q_slack", "1", Judgement;

@@ -11,7 +11,7 @@ pam_data::criteria! {
     PLACES: usize = 5, "n", "1", Derived("quarters of the recorded range");
     /// The slope of the blocked force over pressure is taken over this share of the range of pressure, below the highest one.
     SLOPE_RANGE: f64 = 0.25, "ΔP/P", "1", Derived("away from the onset, where the curve bends");
-    /// With fewer left-out mountings, nothing is said about their lengths.
+    /// With fewer left-out mountings, nothing is concluded about their lengths.
     FEWEST_MOUNTINGS: usize = 8, "n", "1", Derived("with seven degrees of freedom the quantile of Student's t exceeds the normal one by a fifth");
     /// A length of its own for each left-out mounting must remove this share of their squared error.
     LENGTH_GAIN: f64 = 0.5, "g_d", "1", Derived("more than all other causes together");

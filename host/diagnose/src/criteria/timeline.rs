@@ -2,9 +2,9 @@
 
 pam_data::criteria! {
     "Timeline of campaigns":
-    /// Fewer campaigns are no history.
+    /// Fewer campaigns are not a history.
     FEWEST_CAMPAIGNS: usize = 2, "n_camp", "1", Derived("one comparison");
-    /// Fewer known values say nothing of a change: with three, one scatter between campaigns fits any.
+    /// Fewer known values do not show a change: with three, one scatter between campaigns fits any.
     FEWEST_POINTS: usize = 4, "n_pt", "1", Derived("a level, a change, and two degrees of freedom of scatter");
     /// Bins of pressure of a profile at a held length.
     PRESSURE_BINS: usize = 12, "n_P", "1", Judgement;
@@ -18,7 +18,7 @@ pam_data::criteria! {
     COURSE_SCALE_PRIOR: f64 = 1.0, "nu_0", "1", Judgement;
     /// The same for effects against the reference campaign: their intervals hold what repeats between campaigns, remounting included.
     COURSE_EFFECT_PRIOR: f64 = 10.0, "nu_e", "1", Derived("SCALE_PRIOR of the comparison of two campaigns");
-    /// Sizes of a change that are equally likely beforehand, in units of the scatter.
+    /// Sizes of a change that are equally likely a priori, in units of the scatter.
     COURSE_SIZES: ([f64; 4]) = [1.0, 3.0, 10.0, 30.0], "delta/s", "1", Judgement;
     /// Probability of a change from which on it is named: several series are tested together.
     COURSE_CHANGED: f64 = 0.95, "p", "1", Convention("5 %");

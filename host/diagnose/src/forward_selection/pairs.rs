@@ -59,7 +59,7 @@ impl ForwardSelection<'_> {
     fn pair_with(&self, first: &CandidateFit) -> Option<Pair> {
         let (second, _) = self.beside(first).strongest_sufficient(|_| true)?;
         let beside = self.beside(&second.fit);
-        // Before all others are weighed there, which takes time.
+        // Before all others are tested there, which takes time.
         let alone = Scorer::new(&beside.joint, self.scale).refine(first, self.library, &beside.rows);
         if !beside.is_sufficient(&alone, 0.0) {
             return None;

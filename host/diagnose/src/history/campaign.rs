@@ -102,7 +102,7 @@ impl Points {
     }
 }
 
-/// Reads the structure of a campaign; `None` where it is no campaign of isometric staircases with repeated runs.
+/// Reads the structure of a campaign; `None` where it is not a campaign of isometric staircases with repeated runs.
 ///
 /// A run is one recording; for mountings see [`Campaign::mountings`].
 pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {

@@ -17,7 +17,7 @@ use crate::why::{Chance, Evidence};
 const RELAXED_SHARE: &str = "relaxed_share";
 /// The same for `P_b`.
 const BALANCE_PRESSURE: &str = "balance_pressure";
-/// Names of the memory: one and the same to these recordings.
+/// Names of the memory: the same to these recordings.
 pub(super) const NAMES: [&str; 2] =
     [EffectName::LogCreep.info().name, EffectName::StressRelaxation.info().name];
 

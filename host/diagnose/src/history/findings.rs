@@ -1,6 +1,6 @@
 //! What is documented of such muscles, measured without any model: contrasts between visits to the same pressure and length.
 //!
-//! Units of uncertainty are mountings or runs, never rows: rows of one run are no independent measurements.
+//! Units of uncertainty are mountings or runs, never rows: rows of one run are not independent measurements.
 
 use super::campaign::Points;
 use super::criteria::{NEIGHBOURS, PULLS, SHORTENED};

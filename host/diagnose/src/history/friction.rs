@@ -1,7 +1,7 @@
 //! Dry friction beside the memory: which laws of the catalogue act at held length, and whether unseen runs need one.
 //!
-//! At held length the strands' direction `s` follows filling and emptying; or it follows the pressure as it was read, and what a pulse
-//! overshoots by turns it back. The unseen runs decide which. Each law is a loss of force, which as a shift of pressure is the
+//! At held length the strands' direction `s` follows filling and emptying; or it follows the pressure as it was read, and the
+//! overshoot of a pulse reverses it. The unseen runs decide which. Each law is a loss of force, which as a shift of pressure is the
 //! force over the slope of the mounting's curve:
 //!
 //! | law | force, N | over contraction |
@@ -90,7 +90,7 @@ fn columns(layer: &Layer<'_>, areas: &[f64], geometry: &Geometry, direction: &[f
     Some(Columns { base, laws })
 }
 
-/// Mean slope near the highest pressure. A mounting that hardly pulls tells none: then the least that a muscle has.
+/// Mean slope near the highest pressure. A mounting that hardly pulls gives none: then the least that a muscle has.
 pub(super) fn areas(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
     let points = layer.points;
     let slope = |m: usize| {

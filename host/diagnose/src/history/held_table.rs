@@ -12,8 +12,8 @@
 //! | `w_q` | orthonormal combinations of the elastic columns over the lengths, at most as many as there are lengths | – |
 //! | `W, G, D` | the forces of [`EffectName::BladderCreep`] per unit of its amplitudes | |
 //!
-//! At a few held lengths the elastic polynomial is nothing but one curve over pressure for each length: those curves are the unknowns, and
-//! are smooth. All but `k_F`, and the drive of the wall, is linear; both come from the last solution and settle in a few rounds.
+//! At a few held lengths the elastic polynomial is one curve over pressure for each length: those curves are the unknowns, and
+//! are smooth. All except `k_F` and the drive of the wall is linear; both come from the last solution and settle in a few rounds.
 //! A slack muscle pulls no more than it reads. The smoothing is chosen by leaving out runs.
 
 use model_core::braid::Braid;

@@ -12,7 +12,7 @@ use super::beside::Column;
 use super::campaign::Points;
 use super::criteria::FILTER_TIMES;
 
-/// All of them; none of points that were recorded as such, which say nothing about a rate.
+/// All of them; none of points that were recorded as such, which do not show a rate.
 pub(super) fn columns(points: &Points) -> Vec<Column> {
     if !points.averaged {
         return Vec::new();

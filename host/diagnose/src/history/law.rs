@@ -94,7 +94,7 @@ impl<'a> Layer<'a> {
         let pauses = if points.pauses_known() { &PAUSES[..1] } else { &PAUSES[..] };
         let clocks = pauses.iter().map(|p| (*p, Clockwork::new(points, *p, times))).collect();
         let (low, high) = extremes(&thresholds);
-        // One mounting tells c (P_th − P_b) only; two tell P_b where their carried parts differ.
+        // One mounting determines c (P_th − P_b) only; two determine P_b where their carried parts differ.
         let balance_is_free = low < NEAR_BALANCE * BALANCE_START && high - low > RAMP;
         let spline = shift_fit::shifted_spline(points.highest());
         Self { points, spline, thresholds, clocks, balance_is_free }

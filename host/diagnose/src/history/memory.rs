@@ -4,7 +4,7 @@
 //! dz_k/dt = (u − z_k)/τ_k        z̄ = (1/K) Σ z_k
 //! ```
 //! For a drive `u` that runs straight between two points the step is exact, whatever their distance:
-//! `z ← a z + α u_0 + β u_1`, `a = e^(−dt/τ)`, `β = 1 − τ(1 − a)/dt`, `α = (1 − a) − β`. The states start anew with each mounting.
+//! `z ← a z + α u_0 + β u_1`, `a = e^(−dt/τ)`, `β = 1 − τ(1 − a)/dt`, `α = (1 − a) − β`. The states restart with each mounting.
 
 use super::campaign::Points;
 use super::criteria::{VENT_TIME, VENTED_BEFORE};
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_states_outlive_a_pause_and_start_anew_with_a_mounting() {
+    fn the_states_outlive_a_pause_and_restart_with_a_mounting() {
         let points = held(2, 2);
         let z = Clockwork::new(&points, 5.0, &super::super::criteria::TIMES).mean_state(&vec![1.0; 400], 0.0);
         assert!(z[100] > z[0] + 0.2, "the second run starts from the first: {} {}", z[0], z[100]);

@@ -8,7 +8,7 @@ use super::unseen::Unseen;
 use crate::linear::Random;
 use crate::verdict::Region;
 
-/// The places, the most telling first.
+/// The places, the most informative first.
 pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Region> {
     let energy: Vec<f64> = points
         .runs

@@ -63,7 +63,7 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
     });
     let zero = Contrast::of(&read).filter(|c| c.units > 1)?;
     let rise = Contrast::of(&rises).map_or(0.0, |c| c.mean);
-    // A pull that begins softly is no reading of a slack muscle.
+    // A pull that begins softly is not a reading of a slack muscle.
     let sharp = begins_sharply(points, thresholds);
     let far: Vec<FarBelow> =
         (0..points.mountings.len()).filter_map(|m| FarBelow::of(points, thresholds, m)).collect();

@@ -20,8 +20,8 @@ pub(super) struct Point {
     pub force: f64,
     /// 1 filling, −1 emptying.
     pub direction: i8,
-    /// The direction of friction that follows the pressure as it was read, over each of [`FOLLOWED_OVER`]: what a pulse overshoots by turns
-    /// it back.
+    /// The direction of friction that follows the pressure as it was read, over each of [`FOLLOWED_OVER`]: the overshoot of a pulse
+    /// reverses it.
     pub followed: [f64; FOLLOWED_OVER.len()],
     /// The pressure behind a filter of first order with each of [`FILTER_TIMES`], less the pressure, Pa.
     pub filtered: [f64; FILTER_TIMES.len()],
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn direction_turns_once_whatever_the_ripple() {
+    fn direction_reverses_once_despite_ripple() {
         let r = staircase(100.0, 0.5);
         let (points, _) = settled(&r, r.force.as_deref().expect("force"));
         assert_eq!(points.windows(2).filter(|w| w[0].direction != w[1].direction).count(), 1);

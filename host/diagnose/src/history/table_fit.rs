@@ -118,7 +118,7 @@ pub(super) struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Recordings that are not `used` count as the muscle's past, but their forces are not looked at. `None` where the campaign is none
+    /// Recordings that are not `used` count as the muscle's past, but their forces are not used. `None` where the campaign is none
     /// of isometric staircases with repeated runs.
     ///
     /// # Errors
@@ -159,7 +159,7 @@ impl<'a> Prepared<'a> {
         file
     }
 
-    /// The table with some layers: the contact, and friction that follows pressure, where runs that are left out ask for them.
+    /// The table with some layers: the contact, and friction that follows pressure, where runs that are left out require them.
     ///
     /// # Errors
     /// Recordings that cannot be fitted.
@@ -238,7 +238,7 @@ impl<'a> Prepared<'a> {
         Ok(columns)
     }
 
-    /// A table without the history of its fit, but for the earlier load.
+    /// A table without the history of its fit, except the earlier load.
     fn bare(&self, table: MuscleTable, assumed: Assumed) -> TableFile {
         TableFile { table, about: About { earlier_load: assumed.earlier_load, ..About::default() } }
     }
@@ -264,13 +264,13 @@ impl<'a> Prepared<'a> {
         Ok(found)
     }
 
-    /// What the file tells.
+    /// What the file reports.
     fn about(&self, problem: &Problem<'_>, solution: &Solution, assumed: Assumed) -> Result<About> {
         let columns = self.columns(&self.bare(solution.table.clone(), assumed), assumed.width)?;
         let mountings = pluralise(self.points.mountings.len(), "mounting");
         let together = format!(
             "recorded at held lengths ({mountings}): static part, friction and the bladder's memory were fitted together, with the braid \
-             angle, diameter and wall that these lengths ask for"
+             angle, diameter and wall that these lengths require"
         );
         let earlier = assumed.earlier_load.map(|load| {
             format!(
@@ -302,7 +302,7 @@ pub fn table(settled: &Campaign, muscle: &MuscleDescription) -> Result<Option<Ta
     prepared.map(|prepared| prepared.table(Layers::Memory)).transpose()
 }
 
-/// The base model's table. Few recordings may ask for dimensions that no table has: then those of the description stay.
+/// The base model's table. Few recordings may require dimensions that no table has: then those of the description stay.
 fn alone(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFile> {
     let with = |as_described: bool| {
         table_alone(campaign, muscle, &FitOptions { as_described, ..FitOptions::default() })

@@ -34,7 +34,7 @@ pub struct UnseenErrors {
     /// Contact and memory.
     pub with_memory: UnseenError,
     /// The same with the length of each left-out mounting, within `LENGTH_ERROR` of the one that was set, that suits its own readings
-    /// best. This is no prediction: it shows how much of the error comes from the lengths. As `with_memory` where runs are left out.
+    /// best. This is not a prediction: it shows how much of the error comes from the lengths. As `with_memory` where runs are left out.
     pub with_own_length: UnseenError,
     /// The errors without memory of the readings whose pressure another run of the mounting reaches.
     pub supported_without_memory: UnseenError,
@@ -147,7 +147,7 @@ fn reread(file: &TableFile) -> Result<TableFile> {
 /// Which runs are held out together and predicted from the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LeftOut {
-    /// A run; of many, every so many-th.
+    /// A run; of many, every n-th.
     Runs,
     /// All runs of a mounting between others: a contraction of which the fit has no recording.
     Mountings,
@@ -180,7 +180,7 @@ impl LeftOut {
 
 /// The errors of unseen runs over the readings of two forms of one campaign: the one that the tables are fitted to (at its settled points), and
 /// another of the same runs, as recorded. `None` where the campaign is none of isometric staircases with repeated runs, or the other has
-/// other runs. Of many runs every so many-th is left out together.
+/// other runs. Of many runs every n-th is left out together.
 ///
 /// # Errors
 /// Recordings that cannot be fitted or predicted.

@@ -86,7 +86,7 @@ pub(super) fn static_curves(points: &Points, by_direction: bool) -> Unseen {
     Unseen { predicted, folds: Vec::new() }
 }
 
-/// Which runs are left out together: each alone, of many runs every so many-th, which lie in different mountings.
+/// Which runs are left out together: each alone, of many runs every n-th, which lie in different mountings.
 fn groups(points: &Points) -> Vec<Vec<usize>> {
     let runs = points.runs.len();
     let count = runs.min(MOST_FOLDS as usize);

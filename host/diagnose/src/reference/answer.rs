@@ -50,9 +50,9 @@ pub enum NotComparable {
         /// Pa.
         pressure: f64,
     },
-    /// Changes that strokes at regulated pressures are not asked about.
+    /// Changes that strokes at regulated pressures are not tested for.
     Strokes,
-    /// Changes that a motion of length and pressure together is not asked about.
+    /// Changes that a motion of length and pressure together is not tested for.
     Moving,
     /// Parts of strokes at levels, places or speeds that the reference does not have.
     States {
@@ -98,9 +98,9 @@ pub enum Remark {
     OtherTable(String, String),
     /// The difference is larger than a change of the bench makes.
     OtherActuator,
-    /// Mounted anew, and one length only.
+    /// Remounted, and one length only.
     OneLengthMountedAnew,
-    /// Nothing is named, since a mounting anew to a millimetre makes a difference of this size.
+    /// Nothing is named, since remounting to a millimetre makes a difference of this size.
     WithinMounting,
     /// A length that the reference does not have, m: its force there is interpolated, with this error, N.
     Interpolated {
@@ -248,7 +248,7 @@ pub struct Changed {
     pub share_explained: f64,
     /// Its size.
     pub parameters: Vec<Size>,
-    /// Names that these recordings cannot tell from it.
+    /// Names that these recordings cannot distinguish from it.
     pub confusable_with: Vec<String>,
     /// Since when.
     pub since: Since,
@@ -279,13 +279,13 @@ pub struct HeldOut {
     /// rms with them, N.
     pub rms_after_N: f64,
     /// Share of the difference's energy that they remove from the held-out recordings in which they show: a change that begins within
-    /// AFTER says nothing of those before it.
+    /// AFTER does not show in those before it.
     pub share_where_shown: f64,
     /// What repeats, N.
     pub noise_N: f64,
 }
 
-/// A change that was looked at.
+/// A change that was tested.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Considered {
     /// Its name.
@@ -313,9 +313,9 @@ pub struct Reference {
     pub repeatability_N: f64,
     /// Where that is from.
     pub repeatability_from: Repeatability,
-    /// Whether AFTER counts as mounted anew.
+    /// Whether AFTER counts as remounted.
     pub mounted_anew: bool,
-    /// What of AFTER could not be compared, and changes that were not weighed.
+    /// What of AFTER could not be compared, and changes that were not tested.
     pub not_comparable: Vec<NotComparable>,
 }
 
@@ -378,7 +378,7 @@ pub struct ChangeReport {
     pub unexplained: Left,
     /// How much of the difference is gone.
     pub held_out: HeldOut,
-    /// Every change that was weighed.
+    /// Every change that was tested.
     pub considered: Vec<Considered>,
     /// All probabilities of the first weighing, in falling order.
     pub probabilities: Vec<Probability>,

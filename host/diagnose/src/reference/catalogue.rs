@@ -1,4 +1,4 @@
-//! Strokes of a described muscle against earlier ones: every effect of the catalogue is weighed as a change.
+//! Strokes of a described muscle against earlier ones: every effect of the catalogue is tested as a change.
 //!
 //! ```text
 //! BEFORE and AFTER as rows → model fitted to BEFORE alone → its residual by state in BEFORE is subtracted in AFTER

@@ -48,7 +48,7 @@ pub(super) struct Means {
     pub elastic: f64,
     /// Variance of the surface, N².
     pub variance: f64,
-    /// What a lag of a given size does, N; filled in where one is weighed.
+    /// What a lag of a given size does, N; filled in where one is tested.
     pub lag: f64,
 }
 

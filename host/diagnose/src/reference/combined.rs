@@ -23,7 +23,7 @@ use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::table_file::TableFile;
 
 /// Whether something beside the pressure moves the stroke: at one pressure it takes values further apart than a held length does,
-/// smoothly and back and forth. A mounting that gives with the force, and a noisy sensor, do not.
+/// smoothly and back and forth. A mounting that yields with the force, and a noisy sensor, do not.
 pub(super) fn swings(r: &Recording) -> bool {
     let travel = percentile(&r.stroke, STROKES_ENDS.1) - percentile(&r.stroke, STROKES_ENDS.0);
     if !(travel > recording::HELD) {
@@ -46,7 +46,7 @@ pub(super) fn swings(r: &Recording) -> bool {
     turns >= COMBINED_TURNS && spread > COMBINED_SWING * travel
 }
 
-/// ∂F/∂x, N/m, over pressure and stroke; `None` where the reference says nothing.
+/// ∂F/∂x, N/m, over pressure and stroke; `None` where the reference has no data.
 type Slope<'a> = dyn Fn(f64, f64) -> Option<f64> + 'a;
 
 /// A smooth force over pressure and stroke with another level for each direction; only its slopes are used. Over one part of the stroke
@@ -181,7 +181,7 @@ pub(super) fn alone(table: &TableFile, after: &Campaign, said: Mounted) -> Resul
         |p: f64, x: f64| muscle.force(Pressure::from_pascals(p), Length::from_metres(x), 0.0).newtons();
     let high = f64::from(table.table.tested.pressure_high.pascals());
     let least = COMBINED_PULLS * force(high, 0.0).max(0.0);
-    // A table is fitted where the muscle pulls: of a slack one it says nothing.
+    // A table is fitted where the muscle pulls: it does not hold for a slack one.
     let slope = |p: f64, x: f64| {
         (force(p, x) > least).then(|| {
             (force(p, x + TABLE_SURFACE_STEP) - force(p, x - TABLE_SURFACE_STEP)) / (2.0 * TABLE_SURFACE_STEP)

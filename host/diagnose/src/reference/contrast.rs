@@ -15,7 +15,7 @@ pub(super) struct Contrast {
     pub energy: f64,
     /// Cells minus levels.
     pub free: f64,
-    /// Independent directions that the runs can teach.
+    /// Independent directions that the runs can determine.
     pub taught: f64,
     /// Log density of the residual if nothing changed, up to a constant; of no meaning with levels.
     pub density: f64,

@@ -18,9 +18,9 @@ pub enum Done {
     Unchanged,
     /// The bench's correction is beside the table of before.
     Corrected,
-    /// The table of before with the changes of the actuator: AFTER is no whole campaign.
+    /// The table of before with the changes of the actuator: AFTER is not a whole campaign.
     Updated,
-    /// The table is fitted anew to AFTER.
+    /// The table is fitted again to AFTER.
     Refitted,
 }
 
@@ -57,7 +57,7 @@ fn correction(changed: &Changed) -> Option<Correction> {
         | Change::DisplacementOffset
         | Change::SensorDelay
         | Change::PressureSensorLag => parameters[0] = size,
-        // A drift over one campaign says nothing of the next, and a frame's law has a part at turns that was not measured.
+        // A drift over one campaign does not show that of the next, and a frame's law has a part at turns that was not measured.
         _ => return None,
     }
     Some(Correction { effect: changed.effect.clone(), parameters })
@@ -79,7 +79,7 @@ pub fn table(
         Verdict::Unexplained => {
             return refused(
                 "no table is written: something changed that has no name".into(),
-                "leave -o out, look at the report, and fit anew with `host fit` once the bench is in order",
+                "leave -o out, look at the report, and fit again with `host fit` once the bench is in order",
             );
         }
         Verdict::Explained | Verdict::PartlyExplained => {}
@@ -114,9 +114,9 @@ pub fn table(
         Err(effect) => {
             return refused(
                 format!(
-                    "no table is written: a table has no place for `{effect}`, and AFTER is no whole campaign"
+                    "no table is written: a table has no place for `{effect}`, and AFTER is not a whole campaign"
                 ),
-                "record a campaign like the one before, or fit anew with `host fit`",
+                "record a campaign like the one before, or fit again with `host fit`",
             );
         }
     };
@@ -126,7 +126,7 @@ pub fn table(
             format!(
                 "no table is written: with the change applied it would predict AFTER with an error of {with:.2} N, without it with {without:.2} N"
             ),
-            "record a campaign like the one before, or fit anew with `host fit`",
+            "record a campaign like the one before, or fit again with `host fit`",
         );
     }
     Ok((file, Done::Updated))

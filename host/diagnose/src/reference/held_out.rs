@@ -60,7 +60,7 @@ pub(super) fn parts(shows: &[Vec<bool>]) -> Vec<Option<usize>> {
         if showing().any(|c| total[c] < 2) {
             return None;
         }
-        // The part that has fewer of what this run shows, rare changes first; otherwise by turns.
+        // The part that has fewer of what this run shows, rare changes first; otherwise alternately.
         let more: f64 = showing().map(|c| (seen[c][0] - seen[c][1]) / (total[c] as f64).powi(2)).sum();
         let side = if more == 0.0 { 1 - last } else { usize::from(more > 0.0) };
         last = side;
@@ -121,9 +121,9 @@ mod tests {
     #[test]
     fn both_parts_show_every_change_and_a_run_alone_is_in_none() {
         let of = |all: &[u8]| all.iter().map(|s| vec![s & 1 > 0, s & 2 > 0]).collect::<Vec<_>>();
-        // By turns, where all show one change.
+        // Alternately, where all show one change.
         assert_eq!(parts(&of(&[1, 1, 1, 1])), [Some(0), Some(1), Some(0), Some(1)]);
-        // The second change begins late, and its two runs would be in one part by turns.
+        // The second change begins late, and its two runs would be in one part by alternation.
         let two = parts(&of(&[1, 3, 1, 3]));
         assert_ne!(two[1], two[3], "{two:?}");
         assert_eq!(parts(&of(&[0, 0, 2]))[2], None);

@@ -1,4 +1,4 @@
-//! The whole chain for recordings at held lengths: from runs to weighed changes.
+//! The whole chain for recordings at held lengths: from runs to tested changes.
 
 use nalgebra::DVector;
 
@@ -56,7 +56,7 @@ pub(super) struct Reference {
 /// Recordings that leave no common cells, or numbers that cannot be used.
 pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
     let Reference { surface, error, recorded } = reference;
-    // Rows of one part of a motion do not follow one another: they say nothing about lags.
+    // Rows of one part of a motion do not follow one another: they do not show lags.
     // A table is often older: a filter of some seconds may have been added since.
     let tried = if recorded { LAGS_FIRST } else { LAGS.len() };
     let shift = (!runs.moving).then(|| lag::between(&runs, &surface, tried, false));
@@ -80,7 +80,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
         moving: runs.moving,
     };
     let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
-    // Beside rests the first name is weighed as it is: no other one is left by it.
+    // Beside rests the first name is tested as it is: no other one is left by it.
     let inexact = Inexact { share: if runs.moving { COMBINED_SHAPE_ERROR } else { 0.0 }, first: 0.0 };
     let by = Weighing { surface: &surface, lag: shift.as_ref(), inexact, moving: runs.moving, prior_none };
     let weighed = |c: Contrast| (weigh(&cells, &c, by), c);

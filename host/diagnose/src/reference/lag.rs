@@ -12,7 +12,7 @@ use super::surface::{Surface, bin};
 #[derive(Debug, Clone, Copy, Default)]
 struct Score {
     pub lag: f64,
-    /// How much a lag would show: a slack mounting says nothing.
+    /// How much a lag would show: a slack mounting does not show it.
     pub weight: f64,
     /// Variance by the run's own noise, s²: large where two lags explain the force about as well.
     pub variance: f64,
@@ -69,7 +69,7 @@ struct Scorer<'a> {
     rows: Vec<(usize, usize)>,
 }
 
-/// Which rows say something about lags beside a change of friction: at a reversal its force jumps, and a jump at another row than the one
+/// Which rows show lags beside a change of friction: at a reversal its force jumps, and a jump at another row than the one
 /// that is taken for the reversal looks like a lag. `longest`: of the lags that are tried, s.
 fn clear_of_turns(run: &Run, longest: f64) -> Vec<bool> {
     let turned = (1..run.time.len()).filter(|i| run.direction[*i] != run.direction[i - 1]);

@@ -41,7 +41,7 @@ pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length
         }
     }
     let first = analysis.runs.side(false).count();
-    // Parts of one motion are no recordings.
+    // Parts of one motion are not recordings.
     let last = if analysis.runs.moving { first } else { analysis.runs.runs.len() };
     for index in first..last {
         let number = (index - first + 1) as f64;

@@ -1,4 +1,4 @@
-//! One name after the other: what is named is taken out, and the rest is weighed again.
+//! One name after the other: what is named is taken out, and the rest is tested again.
 
 use nalgebra::DVector;
 
@@ -43,7 +43,7 @@ pub(super) struct About<'a> {
 
 /// What was named.
 pub(super) struct Named {
-    /// With the trace of the lag that was weighed last.
+    /// With the trace of the lag that was tested last.
     pub cells: Vec<Cell>,
     pub accepted: Vec<Accepted>,
     /// The weighing after the last name.

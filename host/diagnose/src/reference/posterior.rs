@@ -6,7 +6,7 @@ use super::contrast::log_sum;
 use super::criteria::{NAMED, PRIOR_UNKNOWN, SET};
 use super::shapes::{Change, Class};
 
-/// What is weighed.
+/// What is tested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Cause {
     None,
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn without_evidence_the_prior_stands() {
+    fn without_evidence_the_prior_is_kept() {
         let p = Posterior::of(&[(Cause::None, -3.0), (Cause::Named(Change::ForceGain), -3.0)], 0.8);
         assert!(p.probability(Cause::None) > 0.8 && p.leader().is_none());
         assert_eq!(p.set()[0], Cause::None);

@@ -6,7 +6,7 @@ use super::cells::Cell;
 use super::criteria::{REMOUNT, REPEATABILITY_PULLS, REPEATS};
 
 /// What repeats: standard deviations in per cent of the largest force, learned by restricted maximum likelihood on untouched runs of the
-/// development half and rounded; floors as said.
+/// development half and rounded; floors as stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Repeats {
     /// Slope per unit ln(time since mounting), own to a mounting.
@@ -60,7 +60,7 @@ pub(super) struct Setting {
     pub range: f64,
     /// Largest force, N.
     pub largest: f64,
-    /// Whether AFTER was mounted anew.
+    /// Whether AFTER was remounted.
     pub remounted: bool,
     /// Whether the lengths are parts of one motion: then one mounting shifts them all.
     pub moving: bool,

@@ -40,7 +40,7 @@ pub struct Options {
     pub rest_length: Option<f64>,
     /// The muscle's dimensions, where they are described: then strokes are compared with every effect of the catalogue.
     pub geometry: Option<Geometry>,
-    /// Whether AFTER was mounted anew.
+    /// Whether AFTER was remounted.
     pub mounted: Mounted,
     /// Prior probability that something changed, instead of the usual.
     pub prior_changed: Option<f64>,

@@ -6,7 +6,7 @@ use super::motion;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Clock, Recording};
 
-/// Whether AFTER was mounted anew since BEFORE.
+/// Whether AFTER was remounted since BEFORE.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mounted {
     /// Found from files and clocks: one file, or one clock without a long pause, is one visit.
@@ -54,7 +54,7 @@ pub(super) struct Runs {
     pub strokes: Vec<f64>,
     /// Mountings that only AFTER has, between lengths of the reference: its force there is interpolated.
     pub interpolated: Vec<bool>,
-    /// Whether the AFTER runs of a mounting were mounted anew.
+    /// Whether the AFTER runs of a mounting were remounted.
     pub remounted: bool,
     /// Whether the runs are parts of recordings in which length and pressure move together.
     pub moving: bool,
@@ -120,7 +120,7 @@ pub(super) fn mounted_anew(before: &Campaign, after: &Campaign, said: Mounted) -
                 .fold(f64::NEG_INFINITY, |a, b| a.max(*b));
             let begin =
                 after.recordings.iter().filter_map(|r| r.time.first()).fold(f64::INFINITY, |a, b| a.min(*b));
-            // A clock that shows less than before, or about zero, was started anew and says nothing.
+            // A clock that shows less than before, or about zero, was restarted and does not show it.
             let one_clock = before.clock == Clock::Shared && begin > end && begin - end < NEW_VISIT;
             !(one_file || one_clock)
         }
@@ -147,7 +147,7 @@ impl Runs {
     /// # Errors
     /// A recording without force.
     pub fn alone(after: &Campaign, said: Mounted) -> Result<Self> {
-        // A table was made at some other time: without a word AFTER counts as mounted anew.
+        // A table was made at some other time: without a word AFTER counts as remounted.
         let remounted = said != Mounted::Same;
         let mut all = Self { strokes: mountings(&after.recordings), remounted, ..Self::default() };
         all.add(after, true)?;

@@ -33,7 +33,7 @@ pub enum Change {
     Effect(&'static str),
 }
 
-/// What is to be said of a change.
+/// What to report of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
     /// Its name, as in the catalogue of effects where it is listed.
@@ -42,7 +42,7 @@ pub struct About {
     pub changed: Changed,
 }
 
-/// Every change that settled cells show by a fixed shape or a course, in the order in which they are weighed.
+/// Every change that settled cells show by a fixed shape or a course, in the order in which they are tested.
 pub const CHANGES: [Change; 15] = [
     Change::ForceOffset,
     Change::ForceGain,
@@ -73,7 +73,7 @@ const ELASTIC_STIFFENING: About = About {
     changed: Changed::new(Class::Gain, Owner::Muscle, "ΔF = η·(F − P·∂F/∂P)").sized("stiffening", ""),
 };
 
-/// An effect whose file says nothing of a change; [`Change::from_name`] gives none.
+/// An effect whose file does not describe a change; [`Change::from_name`] gives none.
 const UNLISTED: About = About {
     name: "unlisted",
     changed: Changed::new(Class::Alone("unlisted"), Owner::RigOrMuscle, "not known"),
@@ -116,7 +116,7 @@ impl Change {
         })
     }
 
-    /// What is to be said of it.
+    /// What to report of it.
     #[must_use]
     pub fn about(self) -> About {
         match self {

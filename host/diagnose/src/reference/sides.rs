@@ -79,7 +79,7 @@ pub(super) fn one_actuator(before: &Campaign, after: &Campaign) -> Result<()> {
     }
 }
 
-/// Dates of a campaign's recordings by their names, columns or clocks, s since 1970. A file's time of modification is no date: copies
+/// Dates of a campaign's recordings by their names, columns or clocks, s since 1970. A file's time of modification is not a date: copies
 /// change it.
 fn dates(campaign: &Campaign) -> impl Iterator<Item = f64> + Clone {
     let all: Vec<f64> = campaign

@@ -112,7 +112,7 @@ fn remarks(analysis: &Analysis, verdict: Verdict) -> Vec<Remark> {
         remarks.push(Remark::GaugeOfMotion);
     }
     if let Some((mounting, log)) = analysis.first.local.filter(|l| l.1 > GATE.ln()) {
-        // With a change that all mountings show, the one that shows it most is no news.
+        // With a change that all mountings show, the one that shows it most is not new.
         if !analysis.runs.moving && matches!(verdict, Verdict::Consistent | Verdict::Unexplained) {
             remarks.push(Remark::OneMounting { stroke: analysis.runs.strokes[mounting], log });
         }
@@ -182,7 +182,7 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
     }
 }
 
-/// Names that these recordings cannot tell from a change. In motion the gauge's zero is always one of those of a gain or a zero: on
+/// Names that these recordings cannot distinguish from a change. In motion the gauge's zero is always one of those of a gain or a zero: on
 /// emulated muscles most of these zeros took such a name.
 fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
     let mut all: Vec<Change> = accepted.competitors.clone();

@@ -11,7 +11,7 @@ use super::shapes::{Change, Class};
 use super::stroked::{self, Compared, Weighed};
 use pam_data::error::Result;
 
-/// What was compared, weighed, as the answer.
+/// What was compared and tested, as the answer.
 ///
 /// # Errors
 /// Numbers that cannot be used.

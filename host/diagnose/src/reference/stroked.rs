@@ -36,7 +36,7 @@ pub(crate) struct StrokeRepeats {
 /// The changes that are tested for strokes at regulated pressures.
 pub(super) const ASKED: [Change; 4] =
     [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
-/// Sets of them that are weighed against each other, by index.
+/// Sets of them that are compared with each other, by index.
 const SETS: [&[usize]; 9] = [&[], &[0], &[1], &[2], &[3], &[2, 3], &[1, 2], &[1, 3], &[1, 2, 3]];
 
 /// The differences of both campaigns.
@@ -54,7 +54,7 @@ pub(super) struct Compared {
     pub not_comparable: Vec<NotComparable>,
 }
 
-/// What is weighed, with its log evidence, prior included.
+/// What is tested, with its log evidence, prior included.
 pub(super) struct Weighed {
     /// Probability of every set.
     pub sets: Vec<(Vec<Change>, f64)>,
@@ -245,7 +245,7 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
     let mut weighed = Weighed { sets, sizes: BTreeMap::new(), alone };
     let named = named(&weighed);
     let holds = |i: &usize| named.iter().all(|n| weighed.sets[*i].0.contains(n));
-    // The set of the named ones alone, where it is one of those weighed: what is not named must not share out their sizes.
+    // The set of the named ones alone, where it is one of those tested: what is not named must not share out their sizes.
     let alone = |i: &usize| holds(i) && weighed.sets[*i].0.len() == named.len();
     let best = (0..SETS.len())
         .filter(holds)

@@ -110,7 +110,7 @@ fn a_named_change_is_gone_on_recordings_held_out_and_its_interval_holds_it() {
 }
 
 #[test]
-fn a_shift_of_the_clamp_is_no_change_where_the_actuator_was_mounted_anew() {
+fn a_shift_of_the_clamp_is_not_a_change_where_the_actuator_was_remounted() {
     let anew = ask(&|_, _, _, s| (0.0, 0.7e-3 * s), Mounted::Anew);
     assert!(anew.missing.is_empty(), "{:?}", anew.probabilities);
     assert!(anew.reference.mounted_anew);
@@ -160,7 +160,7 @@ fn one_run_on_each_side_is_answered_with_a_note_and_finite_numbers() {
 }
 
 #[test]
-fn a_sensor_that_stands_still_and_a_lost_force_are_errors() {
+fn a_frozen_sensor_and_a_lost_force_are_errors() {
     let before = campaign(1, 0..2, &untouched);
     let mut dead = campaign(1, 2..4, &untouched);
     for r in &mut dead.recordings {
@@ -215,7 +215,7 @@ fn zero_over_time(course: impl Fn(f64) -> f64) -> ChangeReport {
 
 #[test]
 fn a_zero_that_steps_within_a_recording_is_named_as_a_zero() {
-    // Nine recordings of 60 s; the step is in the middle of the fifth. A step within the recordings is not weighed against a drift.
+    // Nine recordings of 60 s; the step is in the middle of the fifth. A step within the recordings is not compared with a drift.
     let report = zero_over_time(|t| f64::from(u8::from(t > 270.0)));
     let named = report.missing[0].effect.as_str();
     assert!(["force-offset", "force-drift"].contains(&named), "{:?}", report.probabilities);

@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_column_may_be_smaller_than_the_table_and_not_in_another_unit() {
-        // A seventh of the table's pressure is no psi; pounds are smaller than newtons, kilopascals a thousand times pascals.
+        // A seventh of the table's pressure is not psi; pounds are smaller than newtons, kilopascals a thousand times pascals.
         assert!(same_unit("pressure", 100e3, 690e3).is_ok() && same_unit("force", 400.0, 440.0).is_ok());
         assert!(same_unit("pressure", 690e6, 690e3).is_err() && same_unit("pressure", 620.0, 630e3).is_err());
         assert!(same_unit("force", 4.4e5, 440.0).is_err() && same_unit("force", f64::NAN, 1.0).is_ok());

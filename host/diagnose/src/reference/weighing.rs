@@ -59,7 +59,7 @@ impl Inexact {
 #[derive(Clone, Copy)]
 pub(super) struct Weighing<'a> {
     pub surface: &'a Surface,
-    /// The lag between the channels, where it is weighed.
+    /// The lag between the channels, where it is tested.
     pub lag: Option<&'a Shift>,
     pub inexact: Inexact,
     /// Whether the runs are parts of recordings in which length and pressure move together.
@@ -67,7 +67,7 @@ pub(super) struct Weighing<'a> {
     pub prior_none: f64,
 }
 
-/// A change with the courses by which it is weighed. Parts of a motion overlap in time: there only a slip has another course than the whole.
+/// A change with the courses with which it is tested. Parts of a motion overlap in time: there only a slip has another course than the whole.
 fn candidate(cells: &[Cell], change: Change, moving: bool) -> Option<Candidate> {
     if moving && change != Change::EndSlip {
         return Some(Candidate { shape: whole(cells, change)?, kinds: &[Kind::Whole] });

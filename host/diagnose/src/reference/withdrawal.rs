@@ -7,7 +7,7 @@ use super::criteria::{LEFT_BY_NAMES, OTHER_ACTUATOR, UNSEEN_LEAST};
 pub(super) fn withdraw(report: &mut ChangeReport) {
     if report.misfit_rms_N > OTHER_ACTUATOR * report.largest_force_N {
         report.remarks.push(Remark::OtherActuator);
-        // Of another actuator everything differs, and the nearest shape is no change.
+        // Of another actuator everything differs, and the nearest shape is not a change.
         if report.held_out.rms_after_N > LEFT_BY_NAMES * report.largest_force_N {
             without_names(report);
         }

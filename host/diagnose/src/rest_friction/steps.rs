@@ -9,7 +9,7 @@ use crate::rows::Rows;
 use pam_data::recording::white_noise;
 use pam_fit::numerics::median;
 
-/// Where the force steps while the length is held, hold by hold: static friction let go there, shaken by more than the pressure's
+/// Where the force steps while the length is held, hold by hold: static friction was released there, shaken by more than the pressure's
 /// samples show.
 pub(super) fn of(
     rows: &Rows,

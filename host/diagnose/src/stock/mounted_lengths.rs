@@ -185,7 +185,7 @@ fn follow_contraction(all: &[UnseenMounting], fitted: &Stock) -> bool {
                 ))
             })
             .collect();
-        // A line through two others is no test.
+        // A line through two others is not a test.
         if own.len() < 4 {
             continue;
         }

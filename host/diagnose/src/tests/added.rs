@@ -1,5 +1,5 @@
 //! Adding an effect takes its file and one line of a list: here both are outside the catalogue, and the diagnosis finds the effect,
-//! fits its shape and says what would show it, from nothing but that file.
+//! fits its shape and says what would show it, from that file alone.
 
 mod stroke_ripple;
 
@@ -44,7 +44,7 @@ fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
 }
 
 #[test]
-fn what_a_comparison_says_of_its_change_stands_in_its_file() {
+fn the_change_of_an_effect_is_described_in_its_file() {
     let about =
         shapes::of_file(AddedName::StrokeRipple.info(), AddedName::StrokeRipple.traits()).expect("a change");
     assert_eq!(about.name, "stroke-ripple");

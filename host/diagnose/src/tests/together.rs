@@ -7,14 +7,14 @@ use crate::forward_selection::forward_selection;
 use crate::linear::energy;
 use crate::rows::{prepare, typical_step};
 
-/// What is wrong on a bench, besides friction of 8 %.
+/// What is wrong on a bench, in addition to friction of 8 %.
 #[derive(Default)]
 pub(super) struct Wrong {
     /// Length that an end loses in the middle of the third file, as a share of the largest stroke.
     pub slip: f64,
     /// Friction for each pascal, N.
     pub friction_per_pascal: f64,
-    /// Friction besides, N.
+    /// Further friction, N.
     pub friction: f64,
     /// How fast the load cell's zero drifts, N/h.
     pub drift_per_hour: f64,

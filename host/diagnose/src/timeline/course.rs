@@ -53,7 +53,7 @@ pub struct Course {
     pub changes: Vec<Change>,
     /// Probability that nothing (more) changed.
     pub none: f64,
-    /// Scatter of the campaigns over what their own repeats show; `None` with fewer points than can tell.
+    /// Scatter of the campaigns over what their own repeats show; `None` with too few points to decide.
     pub scatter: Option<f64>,
     /// Whether there are too few campaigns for a judgement.
     pub too_few: bool,

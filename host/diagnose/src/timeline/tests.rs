@@ -30,7 +30,7 @@ fn dates(n: usize) -> Vec<f64> {
 }
 
 #[test]
-fn series_without_change_are_seldom_named_whatever_campaigns_scatter_by() {
+fn series_without_change_are_rarely_named_at_any_scatter_between_campaigns() {
     let mut noise = Noise(7);
     let (mut named, mut all) = (0, 0);
     for n in [4, 6, 10, 20] {
@@ -71,7 +71,7 @@ fn a_step_is_found_where_it_is_and_a_slope_is_called_gradual() {
 }
 
 #[test]
-fn two_steps_are_two_changes_and_there_and_back_is_found() {
+fn two_steps_are_two_changes_and_a_return_is_found() {
     let values = [100.0, 100.4, 99.7, 100.1, 115.0, 114.6, 115.3, 115.1, 99.8, 100.2, 100.0, 99.9];
     let course = find(&dates(12), &series(&values, 0.4));
     let steps: Vec<(usize, usize)> = course.changes.iter().map(|c| (c.from, c.to)).collect();

@@ -26,7 +26,7 @@ pub struct Span {
     pub stroke: (f64, f64),
 }
 
-/// Plays narrower than this share of the travel are no memory of loops: they are a dry friction under another name.
+/// Plays narrower than this share of the travel are not a memory of loops: they are a dry friction under another name.
 const NARROWEST_PLAY: f64 = 0.02;
 
 impl Span {

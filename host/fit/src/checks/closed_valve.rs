@@ -17,7 +17,7 @@ use pam_data::recording::Quantity;
 
 /// Readings before a valve closes whose mean is the pressure at which it closed.
 const BEFORE: usize = 5;
-/// Pressure from which on closing a valve tells something, Pa.
+/// Pressure from which on closing a valve shows a leak, Pa.
 const PRESSED: f64 = 2e4;
 /// A loss is followed down to this share of the pressure at which the valve closed: below it, flow through a small leak is slower.
 const FOLLOWED: f64 = 0.5;
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tight_muscle_loses_nothing_that_matters_and_a_torn_one_does() {
+    fn a_tight_muscle_loses_nothing_that_matters_and_a_leaking_one_does() {
         assert!(table(1e-4).unwrap().lost_part().1 < 1e-3);
         assert!(table(10.0).unwrap().lost_part().0 > 5e-3);
     }

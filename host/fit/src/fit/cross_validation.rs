@@ -10,7 +10,7 @@ use super::smoothing;
 use super::solution::Solution;
 use pam_data::progress::Progress;
 
-/// Each tested pressure predicted from the others by refitting without it, its smoothing chosen anew. Per group, the mean
+/// Each tested pressure predicted from the others by refitting without it, its smoothing chosen again. Per group, the mean
 /// error.
 pub(super) fn predict_left_out(
     solution: &Solution,

@@ -1,8 +1,8 @@
 //! Effective dimensions, and the length of each mounting: what a tape measure and a data sheet leave uncertain.
 //!
 //! Each such unknown enters as one more column of the joint problem, `∂F/∂p` at the present solution, with a prior as wide as the
-//! uncertainty of the measurement that it represents. The columns are computed anew at every step (Gauss–Newton), and a step goes only
-//! as far as it lowers the objective of a table solved anew at its end. Values stay within stated bounds. Each is reported with the
+//! uncertainty of the measurement that it represents. The columns are computed again at every step (Gauss–Newton), and a step goes only
+//! as far as it lowers the objective of a table solved again at its end. Values stay within stated bounds. Each is reported with the
 //! share of the prior's variance that the recordings removed.
 
 use model_core::braid::Geometry;
@@ -96,7 +96,7 @@ struct Search<'a> {
     excess: f64,
 }
 
-/// How often the priors are weighed anew against the remaining misfit.
+/// How often the priors are compared again with the remaining misfit.
 const PASSES: usize = 3;
 /// Steps of a pass.
 const STEPS: usize = 12;
@@ -153,7 +153,7 @@ pub(super) fn adjust(
 }
 
 impl Search<'_> {
-    /// Gauss–Newton steps in the dimensions, each no longer than lowers the objective of a table solved anew there: far from the
+    /// Gauss–Newton steps in the dimensions, each no longer than lowers the objective of a table solved again there: far from the
     /// solution the columns `∂F/∂p` hold over a part of a step only, and whole steps would oscillate.
     fn descend(&mut self) {
         let size = self.parameters.len() - self.at.len();

@@ -1,4 +1,4 @@
-//! The thesis's models side by side on one set of mid-lines, and two that it asks for.
+//! The thesis's models side by side on one set of mid-lines, and two that it requires.
 //!
 //! | name | force | what is fitted |
 //! | --- | --- | --- |

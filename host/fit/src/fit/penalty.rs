@@ -49,7 +49,7 @@ impl Design {
             }
             if k == layout.order {
                 // Beyond the data friction tends to stay: a trend continued for long would pass zero or one. So weakly that it never
-                // speaks against data: noise asks for stiff curves, and a pull as stiff as these would flatten k_F over pressure.
+                // contradicts data: noise requires stiff curves, and a pull as stiff as these would flatten k_F over pressure.
                 let stay = 0.02 * bend_friction.min(Smoothing::START.friction) * scale * force_squared;
                 for j in 1..nodes.len() {
                     penalty.add_row(&[(place(j - 1), -1.0), (place(j), 1.0)], stay);

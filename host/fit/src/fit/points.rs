@@ -134,7 +134,7 @@ impl HeldMounting {
 
 impl Points {
     /// How far single rows scatter about their point's mean, N, by the median: noise that is correlated over some rows shows here
-    /// and not in `row_noise`. 0 where points hold too few rows to tell.
+    /// and not in `row_noise`. 0 where points hold too few rows to show it.
     #[must_use]
     pub(crate) fn scatter_within(&self) -> f64 {
         // The range of n normal values is about 2 √(2 ln n) standard deviations.

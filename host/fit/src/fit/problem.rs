@@ -208,7 +208,7 @@ fn both_directions(points: &Points, screen: &Screen) -> bool {
 }
 
 /// Columns at strokes spread evenly over the tested range, so that the time spent at a stroke does not matter. Strokes that differ by
-/// noise only count once, and so does a mounting whose length was read anew in each run.
+/// noise only count once, and so does a mounting whose length was read again in each run.
 fn spread(points: &Points, shift: &[f64], braid: &Braid<f64>, used: &[PointUse]) -> Vec<Columns> {
     const PLACES: usize = 400;
     /// Two readings of one length differ by less than this many standard deviations.

@@ -22,7 +22,7 @@ pub enum PointUse {
     Clipped,
     /// Excluded: the reading is far outside the scatter of the others.
     Outlier,
-    /// Excluded: a sensor failed for these rows, or something besides the muscle holds a constant load.
+    /// Excluded: a sensor failed for these rows, or something other than the muscle holds a constant load.
     Dropout,
 }
 

@@ -63,7 +63,7 @@ pub(crate) fn choose(
         trials.push(Trial { smoothing, score });
         score
     };
-    // Both together first, then friction alone: two curves that hardly speak to each other.
+    // Both together first, then friction alone: two curves that hardly depend on each other.
     let grid = |from: i32, to: i32| (from..=to).map(|e| 10.0_f64.powf(f64::from(e) / 2.0));
     // Of weights that score similar the stiffest: where the data do not care, curves stay calm.
     let best_of = |scored: Vec<(f64, f64)>, alike: f64| {

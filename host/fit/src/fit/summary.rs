@@ -66,7 +66,7 @@ pub struct Summary {
     pub adjusted: Vec<Adjusted>,
     /// Residuals by recording and mounting.
     pub recordings: Vec<RecordingResidual>,
-    /// The largest force that was measured, without readings that are no measurement, N: a scale that no fit enters.
+    /// The largest force that was measured, without readings that are not a measurement, N: a scale that no fit enters.
     pub largest_force_N: f64,
     /// What the user must know, one sentence or more each.
     pub warnings: Vec<String>,
@@ -132,7 +132,7 @@ pub struct RowUse {
     pub clipped: usize,
     /// Rows whose force is outside the scatter of the others.
     pub outliers: usize,
-    /// Rows where a sensor failed, or something besides the muscle held a constant load; absent where there are none.
+    /// Rows where a sensor failed, or something other than the muscle held a constant load; absent where there are none.
     #[serde(skip_serializing_if = "is_zero")]
     pub dropouts: usize,
 }

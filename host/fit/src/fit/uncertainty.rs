@@ -1,6 +1,6 @@
 //! How uncertain the parameters are: a jackknife over blocks of the motion.
 //!
-//! Residuals are correlated in time (noise that is coloured, misfit that lasts), so single rows are no independent witnesses.
+//! Residuals are correlated in time (noise that is coloured, misfit that lasts), so single rows are not independent witnesses.
 //! Blocks are stretches of a half-stroke several autocorrelation times long. Each is left out in turn; around the
 //! solution that is a subtraction from the normal equations:
 //!
@@ -233,14 +233,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn few_blocks_widen_the_interval_as_students_t_says() {
+    fn few_blocks_widen_the_interval_by_students_t() {
         assert!((few_blocks(2) * HALF_95 - 12.706).abs() < 1e-2);
         assert!((few_blocks(6) * HALF_95 - 2.571).abs() < 1e-2);
         assert!((few_blocks(100_000) - 1.0).abs() < 1e-3);
     }
 
     #[test]
-    fn a_lag_that_one_block_reaches_says_little() {
+    fn a_lag_that_one_block_reaches_is_uncertain() {
         // Forty short half-strokes and a long one whose ends differ in sign.
         let mut values: Vec<f64> = (0..400).map(|i| if i % 3 == 0 { 1.0 } else { -0.5 }).collect();
         let mut block: Vec<u32> = (0..400).map(|i| i / 10).collect();

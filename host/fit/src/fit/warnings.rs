@@ -47,7 +47,7 @@ fn rows(solution: &Solution, wanted: PointUse) -> usize {
 /// Whether sign, units and dimensions can be right.
 fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
     let force = &solution.problem.points.force;
-    // A code for missing readings, such as −999, is no force.
+    // A code for missing readings, such as −999, is not a force.
     if solution.problem.clips.0.is_none() && -force.low > WRONG_SIGN * force.high {
         out.push(format!(
             "the force ranges from {:.1} N to {:.1} N: force is positive as the muscle pulls; invert its sign with scale = -1 in an \

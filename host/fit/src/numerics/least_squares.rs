@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_block_alone_tells_is_not_known_to_any_error() {
+    fn a_slope_that_one_block_alone_shows_has_no_error() {
         // A line through three stays at zero and one at ten: without that one there is no slope.
         let x: Vec<f64> = (0..40).map(|i| if i < 30 { 0.0 } else { 10.0 }).collect();
         let block: Vec<usize> = (0..40).map(|i| i / 10).collect();

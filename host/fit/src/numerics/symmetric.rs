@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_determined_stays_zero() {
+    fn an_undetermined_unknown_stays_zero() {
         let mut a = Symmetric::zeros(3);
         a.add_row(&[(0, 1.0), (1, 1.0)], 2.0);
         a.add_row(&[(2, 1.0)], 1.0);

@@ -9,7 +9,7 @@ use pam_data::error::{Error, Result};
 use super::Row;
 use crate::error::FleetCode;
 
-/// A header line is not longer than this; what is longer is no manifest.
+/// A header line is not longer than this; what is longer is not a manifest.
 const LONGEST_HEADER: u64 = 1 << 16;
 
 type Rows = Box<dyn Iterator<Item = (u64, Result<Row>)> + Send>;

@@ -197,7 +197,7 @@ fn first_line(text: &str) -> &str {
     line.split_once(": <?xml").map_or(line, |(before, _)| before)
 }
 
-/// Lists at most one object, which tells a missing bucket and wrong credentials before anything is computed.
+/// Lists at most one object, which reports a missing bucket and wrong credentials before anything is computed.
 pub(crate) fn check(address: &str) -> Result<()> {
     let code = DataCode::FileUnwritable;
     let done = with(address, code, |store, key| async move {

@@ -38,7 +38,7 @@ except ImportError:
             """Sets parameters by name."""
             for name, value in parameters.items():
                 if name not in _PARAMETERS:
-                    raise ValueError(f"`{name}` is no parameter of {type(self).__name__}; they are {', '.join(_PARAMETERS)}")
+                    raise ValueError(f"`{name}` is not a parameter of {type(self).__name__}; they are {', '.join(_PARAMETERS)}")
                 setattr(self, name, value)
             return self
 

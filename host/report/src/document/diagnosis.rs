@@ -318,7 +318,7 @@ fn trace(t: &Trace) -> TraceDocument<'_> {
 mod tests {
     use super::DiagnosisDocument;
 
-    /// The published schema is generated; `SCHEMA=overwrite cargo test -p pam-report schema` writes it anew.
+    /// The published schema is generated; `SCHEMA=overwrite cargo test -p pam-report schema` rewrites it.
     #[test]
     fn the_published_schema_is_that_of_the_types() {
         let schema = schemars::schema_for!(DiagnosisDocument<'_>);
@@ -327,10 +327,6 @@ mod tests {
         if std::env::var("SCHEMA").is_ok_and(|v| v == "overwrite") {
             std::fs::write(path, &text).unwrap();
         }
-        assert_eq!(
-            std::fs::read_to_string(path).unwrap_or_default(),
-            text,
-            "SCHEMA=overwrite writes it anew"
-        );
+        assert_eq!(std::fs::read_to_string(path).unwrap_or_default(), text, "SCHEMA=overwrite rewrites it");
     }
 }

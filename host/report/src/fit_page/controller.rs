@@ -3,7 +3,7 @@
 use super::super::{Axis, Colour, Figure, Panel, Section, fixed, significant};
 use super::view::{Banded, View};
 
-/// Contractions at which the force is looked at, shares of the tested range.
+/// Contractions at which the force is evaluated, shares of the tested range.
 const PLACES: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
 /// Pressures along each curve.
 const STEPS: usize = 60;

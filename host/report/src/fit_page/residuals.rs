@@ -35,7 +35,7 @@ fn trend(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let sum = &mut sums[bin];
         *sum = (sum.0 + a, sum.1 + b, sum.2 + 1.0);
     }
-    // A handful of points at the edge of a level is no trend.
+    // A handful of points at the edge of a level is not a trend.
     let least = (0.003 * x.len() as f64).max(5.0);
     sums.iter().filter(|s| s.2 >= least).map(|s| (s.0 / s.2, s.1 / s.2)).unzip()
 }

@@ -66,8 +66,8 @@ pub fn remark(remark: &Remark) -> String {
             format!("the table is that of `{table}`, and `{muscle}` is described: is it the same actuator?")
         }
         Remark::OtherActuator => "the difference is larger than a change of the bench makes: is it the same actuator, and are the signs and units the same?".into(),
-        Remark::OneLengthMountedAnew => "AFTER was mounted anew and has one length only: a shift of the clamp by a millimetre cannot be distinguished from a change of gain; record at two lengths".into(),
-        Remark::WithinMounting => "the difference is larger than runs of one mounting differ by, and no larger than a mounting anew to a millimetre makes it, as recordings in different files count; if nothing was taken off the bench, add --same-mounting".into(),
+        Remark::OneLengthMountedAnew => "AFTER was remounted and has one length only: a shift of the clamp by a millimetre cannot be distinguished from a change of gain; record at two lengths".into(),
+        Remark::WithinMounting => "the difference is larger than between runs of one mounting, but remounting to within a millimetre can cause it. Recordings in different files count as remounted; if nothing was taken off the bench, add --same-mounting".into(),
         Remark::NothingTwice => "nothing in the reference was recorded twice: how far the actuator repeats is assumed, not measured".into(),
         Remark::OneMounting { stroke, log } => format!(
             "the mounting at {:.1} mm differs alone (Bayes factor e^{log:.0}): clamped again, or slipped?",
@@ -83,12 +83,12 @@ pub fn remark(remark: &Remark) -> String {
             100.0 * share
         ),
         Remark::SlippedRests(rests) => format!(
-            "{} at a held length hardly count: friction slipped there in one of the campaigns, as a regulator's drift makes it",
+            "{} at a held length hardly count, because friction slipped there in one of the campaigns, as the drift of a regulator causes it",
             pluralise(*rests, "rest")
         ),
         Remark::StrokesMarginal => "probabilities are those that a change is there at all; several changes can be present together".into(),
         Remark::NotAcquitted(none) => {
-            format!("no change is named, but that nothing changed has a probability of {none:.2} only")
+            format!("no change is named, but the probability that nothing changed is only {none:.2}")
         }
         Remark::GaugeOfMotion => "where length and pressure move together, a zero error of the pressure gauge is often mistaken for a gain, an offset of the stroke or a zero of the load cell: vent the actuator and read the gauge first".into(),
         Remark::GainOfStrokes => "at regulated pressures a gain of the load cell, a gain of the gauge and another piston area have the same shape".into(),
@@ -274,7 +274,7 @@ fn usual_unit(value: f64, unit: &str) -> (f64, String) {
     (factor, format!(" {name}"))
 }
 
-/// Numbers without a unit that are no shares.
+/// Numbers without a unit that are not shares.
 const COUNTS: [&str; 4] = ["exponent", "order", "onset", "width"];
 
 /// A size with its interval in a unit that people use.
@@ -352,7 +352,7 @@ pub fn summary(r: &ChangeReport) -> String {
         let share = if h.rms_before_N > 0.0 { 1.0 - (h.rms_after_N / h.rms_before_N).powi(2) } else { 0.0 };
         let _ = writeln!(
             text,
-            "\nOn recordings held out ({}): {:.2} N without, {:.2} N with; {:.0} % of the difference's energy is gone.",
+            "\nOn held-out recordings ({}): {:.2} N without the named changes, {:.2} N with them; they explain {:.0} % of the squared difference.",
             split(h.split),
             h.rms_before_N,
             h.rms_after_N,

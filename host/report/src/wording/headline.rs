@@ -2,7 +2,7 @@
 
 use pam_diagnose::reference::{ChangeReport, Verdict};
 
-/// "Nothing changed" is said with its probability where the recordings make it less probable than it counts before them.
+/// "Nothing changed" is stated with its probability where the recordings make it less probable than it counts before them.
 const DOUBTFUL: f64 = 0.8;
 
 /// The sentence that stands first.
@@ -14,7 +14,7 @@ pub fn headline(r: &ChangeReport) -> String {
         Verdict::Consistent => consistent(r.probability("none")),
         Verdict::Explained => format!("What changed: {}.", names.join(", ")),
         Verdict::PartlyExplained if explained < 0.5 => format!(
-            "What changed: {}. Of the difference this is {:.0} %; the larger part has no name.",
+            "What changed: {}. This explains {:.0} % of the difference; the larger part has no name.",
             names.join(", "),
             100.0 * explained
         ),
@@ -27,7 +27,7 @@ pub fn headline(r: &ChangeReport) -> String {
 
 fn consistent(none: f64) -> String {
     if none < DOUBTFUL {
-        format!("No change stands out, but that nothing changed has a probability of {none:.2} only.")
+        format!("No change stands out, but the probability that nothing changed is only {none:.2}.")
     } else {
         "Nothing changed beyond what this actuator does anyway.".into()
     }
@@ -38,8 +38,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_changed_is_not_said_without_doubt_where_there_is_some() {
-        assert!(consistent(0.58).contains("0.58 only"));
+    fn nothing_changed_is_stated_with_its_doubt() {
+        assert!(consistent(0.58).contains("is only 0.58"));
         assert!(consistent(0.97).starts_with("Nothing changed"));
     }
 }

@@ -17,7 +17,7 @@ pub(crate) struct HiddenEffect<'a> {
 pub(crate) struct Hidden<'a> {
     /// By what would show it.
     pub(crate) by_measure: Vec<(&'static str, Vec<HiddenEffect<'a>>)>,
-    /// What only a moving muscle shows, of one that is used at held lengths: strokes are no advice for it.
+    /// What only a moving muscle shows, of one that is used at held lengths: strokes are not advice for it.
     pub(crate) moving: Vec<HiddenEffect<'a>>,
 }
 

@@ -14,7 +14,7 @@ pub(crate) fn finding(of: &Finding) -> String {
         FindingDetail::Shift { lasts, shortened_mm } => shift(of, *lasts, *shortened_mm),
         FindingDetail::LoadedBefore => format!(
             "the muscle had been loaded for about {:.0} s before the first recorded run: a smaller first-run deficit is to be expected (chosen on a \
-             grid, weakly known)",
+             grid, uncertain)",
             of.size.value
         ),
         FindingDetail::SlackReading { grows } => slack_reading(of, *grows),
@@ -26,13 +26,13 @@ pub(crate) fn finding(of: &Finding) -> String {
 pub(crate) fn memory_refusal(of: &MemoryRefusal) -> String {
     match of {
         MemoryRefusal::SmallShare { share, least } => {
-            format!("the relaxed share is {share:.3}; {least} is the least that is named")
+            format!("the relaxed share is {share:.3}; at least {least} is required")
         }
         MemoryRefusal::UncertainShare { share, half } => {
-            format!("the relaxed share {share:.3} is within its 95 % interval of none (± {half:.3}, by runs)")
+            format!("the 95 % interval of the relaxed share includes zero ({share:.3} ± {half:.3}, by runs)")
         }
         MemoryRefusal::SmallGain { against, gain, least } => format!(
-            "against {} the squared error of unseen runs falls by {:.0} %; {:.0} % is the least",
+            "against {} the squared error of unseen runs falls by {:.0} %; at least {:.0} % is required",
             match against {
                 StaticCurve::ByMounting => "a curve for each mounting",
                 StaticCurve::ByMountingAndDirection => "a curve for each mounting and direction",
@@ -69,7 +69,7 @@ fn includes_zero(of: &Finding) -> String {
 fn first_run(of: &Finding, left: Option<f64>) -> String {
     let rest = match (of.found, left) {
         (true, Some(left)) => format!(
-            "; one memory of the bladder, which does not recover in the pauses; of the first filling it leaves {:.1} N",
+            "; the memory of the bladder, which does not recover in the pauses, explains it except for {:.1} N",
             -left
         ),
         (true, None) => String::new(),
@@ -150,7 +150,7 @@ fn shift(of: &Finding, lasts: bool, shortened_mm: f64) -> String {
         match (lasts, of.found) {
             (true, true) => "the held length changed",
             (true, false) => "the held length may have changed; a finding requires four standard errors",
-            (false, _) => "look at this run before it is used",
+            (false, _) => "check this run before you use it",
         }
     )
 }
@@ -159,8 +159,8 @@ fn slack_reading(of: &Finding, grows: Option<f64>) -> String {
     let mountings = of.units;
     if let Some(force) = grows {
         return format!(
-            "while the muscle is slack, the reading of the load cell grows with the pressure: by {force:.1} N up to the highest pressure where it \
-             grows least ({mountings} mountings), which is more than a lifting tube makes: it reads the pressure"
+            "while the muscle is slack, the reading of the load cell grows with the pressure, by at least {force:.1} N up to the highest pressure \
+             ({mountings} mountings). This is more than a lifting tube makes: the load cell reads the pressure"
         );
     }
     let cause = match (of.found, of.size.value > 0.0) {

@@ -10,12 +10,13 @@ pub fn remark(remark: &Remark) -> String {
     match remark {
         Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
         Remark::StaticMisfit(rms) => format!(
-            "without the memory, the static model over all mountings still leaves {rms:.2} N rms: geometry, end effects and mounted lengths (±1 mm \
-             by tape measure) are not identifiable from one muscle; three muscles of one type or more, diagnosed together, show them"
+            "the static model of all mountings, without the memory, leaves {rms:.2} N rms. Geometry, end effects and mounted lengths (±1 mm by \
+             tape measure) are not identifiable from one muscle; diagnose three or more muscles of one type together to identify them"
         ),
         Remark::MemoryInTable => {
-            "the table that -o writes carries the memory as `bladder-creep`, where it predicts the recordings better with it; the length was \
-             held throughout, so under motion it is a prediction. To measure its recovery, repeat a run at one mounting after a vented hour"
+            "the table that -o writes contains the memory as `bladder-creep` if this improves the prediction of the recordings. The length was \
+             held throughout, so under motion the memory is a prediction. To measure its recovery, vent the muscle for an hour, then repeat a \
+             run at the same mounting"
                 .to_owned()
         }
         Remark::HeldLength => {
@@ -53,7 +54,7 @@ pub fn remark(remark: &Remark) -> String {
             format!("{excluded} of {total} force readings excluded: isolated outliers")
         }
         Remark::InverseFriction { constant, slope } => format!(
-            "k_F(P) follows {constant:.3} + {:.1} kPa/P, as friction does that is not proportional to force (dry, seal, or viscous at \
+            "k_F(P) follows {constant:.3} + {:.1} kPa/P: this friction is not proportional to force (dry, seal, or viscous at \
              one speed)",
             slope * 1e-3
         ),
@@ -93,7 +94,7 @@ fn unjudgeable(reason: &Unjudgeable) -> String {
             format!("{usable} usable (direction known, muscle not slack); {least} are needed")
         }
         Unjudgeable::FewStrokes { found, least } => format!(
-            "only {} (from one reversal to the next; where the length is held, of the pressure); {least} are needed to tell an effect \
+            "only {} (from one reversal to the next; where the length is held, of the pressure); {least} are needed to distinguish an effect \
              from chance",
             pluralise(*found, "half-stroke")
         ),
@@ -203,7 +204,7 @@ pub fn reserve(r: &Reserve) -> String {
         r.with,
         r.without,
         if r.kept {
-            "They were written all the same, because they were given"
+            "They were written nevertheless, because they were given"
         } else {
             "The table was written without them"
         }

@@ -183,7 +183,7 @@ fn verdict(report: Option<&ChangeReport>) -> String {
     }
 }
 
-/// What is said of each campaign.
+/// The text on each campaign.
 #[must_use]
 pub fn campaigns(visits: &[Visit], found: &Timeline) -> Vec<[String; 4]> {
     let one = |(v, r): (&Visit, &Option<ChangeReport>)| {

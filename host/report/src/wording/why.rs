@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_effect_that_was_given_is_said_to_be_supported_or_not() {
+    fn a_given_effect_is_reported_as_supported_or_not() {
         let unseen = UnseenError { without: 0.5, with: 0.2 };
         let found = Evidence {
             share: 0.83,

@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     /// Calibrate this sensor with the known values or points that are given.
     #[arg(long, value_enum, value_name = "SENSOR")]
     calibrate: Option<Name>,
-    /// A known value at the sensor, in kPa, mm, or N. One alone moves the zero; with several, the command asks for one after the
+    /// A known value at the sensor, in kPa, mm, or N. One alone moves the zero; with several, the command prompts for one after the
     /// other, and waits for Enter before it measures.
     #[arg(
         long,
@@ -224,7 +224,7 @@ fn calibrate(
     Ok(())
 }
 
-/// Measures the signal at each known value; asks for one after the other where there are several.
+/// Measures the signal at each known value; prompts for one after the other where there are several.
 fn measure_pairs(
     arguments: &Arguments,
     sensor: Sensor,

@@ -33,11 +33,11 @@ pub struct Options {
     /// Take only rows of the reference where a column has this value, instead of --where; may be given several times.
     #[arg(long, value_name = "COLUMN=VALUE", requires = "reference", help_heading = "Comparison")]
     reference_where: Vec<String>,
-    /// The actuator was not taken off the bench in between. Without this option recordings of several files count as mounted anew, unless
+    /// The actuator was not taken off the bench in between. Without this option recordings of several files count as remounted, unless
     /// their clock is one.
     #[arg(long, requires = "reference", conflicts_with = "remounted", help_heading = "Comparison")]
     same_mounting: bool,
-    /// The actuator was taken off and mounted anew, although files or clock look like one visit.
+    /// The actuator was taken off and remounted, although files or clock look like one visit.
     #[arg(long, requires = "reference", help_heading = "Comparison")]
     remounted: bool,
     /// Probability of a change before any evidence, 0.01 to 0.99.
@@ -259,7 +259,7 @@ fn written(output: &Path, done: Done) -> String {
         Done::Updated => {
             "the table of before with the change of the actuator applied; a whole campaign after the change allows a new fit"
         }
-        Done::Refitted => "the table fitted anew to the recordings after the change",
+        Done::Refitted => "the table fitted again to the recordings after the change",
     };
     format!("{}: {what}", output.display())
 }

@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn one_muscle_stands_anywhere() {
+    fn one_muscle_is_accepted_at_any_position() {
         let arguments = parsed("diagnose 1.csv --muscle a.toml");
         assert!(!arguments.muscles.several());
         assert_eq!(arguments.muscles.first(), Some(Path::new("a.toml")));

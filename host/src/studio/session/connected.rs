@@ -297,7 +297,7 @@ impl Connected {
                 }
                 let reachable = Reachability::of(&mut self.client)?;
                 if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
-                    return Err(Error::new(DataCode::CallInvalid, words).help("ask for less"));
+                    return Err(Error::new(DataCode::CallInvalid, words).help("request less"));
                 }
                 if self.status.state == State::Running && !self.client.controls() {
                     return Err(messages::in_use("start"));
@@ -318,7 +318,7 @@ impl Connected {
                 let cleared = self.client.call_once::<ClearFault>(&());
                 self.status = self.client.call::<GetStatus>(&())?;
                 self.note_fault()?;
-                // The purpose is that none is latched: one that is gone already is no failure.
+                // The purpose is that none is latched: one that is gone already is not a failure.
                 if self.status.state == State::Fault {
                     cleared?;
                 }

@@ -48,7 +48,7 @@ pub enum Motion {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scripts {
-    /// In the order in which the board asks for them by number.
+    /// In the order in which the board requests them by number.
     pub script: Vec<Motion>,
 }
 

@@ -55,7 +55,7 @@ impl Accumulator {
 
     /// Takes one byte; at the end of a frame gives the frame, or why it is none.
     ///
-    /// Zeros in a row are no frames and no errors: a sender may flush the line with them.
+    /// Zeros in a row are neither frames nor errors: a sender may flush the line with them.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         let frame = self.take(byte)?;
         Some(frame.map(|(header, body)| Frame { header, body: &self.buffer[HEADER..HEADER + body] }))

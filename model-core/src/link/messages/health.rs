@@ -60,7 +60,7 @@ codes! {
     }
 }
 
-/// Asks for the sums of one muscle.
+/// Requests the sums of one muscle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct HealthRead {
     /// Which one.

@@ -10,7 +10,7 @@ use crate::fields::{codes, fields};
 pub const FAULT_LOG: usize = 8;
 
 codes! {
-    /// States of safety. Nothing but a host's request leads towards `Running`, and no fault is left without one.
+    /// States of safety. Only a request of a host leads towards `Running`, and no fault is left without one.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum State {
         /// After every start: vented, answers questions.
@@ -144,7 +144,7 @@ pub struct Faults {
 
 fields!(Faults { latched, counts });
 
-/// Asks for one past fault: 0 the last, 1 the one before.
+/// Requests one past fault: 0 the last, 1 the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PastFault {
     /// How far back, less than [`FAULT_LOG`].

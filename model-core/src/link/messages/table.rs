@@ -52,7 +52,7 @@ pub struct TablePiece {
 
 fields!(TablePiece { offset, bytes });
 
-/// Asks for a piece of the table in use, from the store.
+/// Requests a piece of the table in use, from the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TableRead {
     /// Muscle.

@@ -71,7 +71,7 @@ pub struct Signals {
 
 fields!(Signals { pressure, stroke, force, second_pressure });
 
-/// Asks for the signals of a muscle.
+/// Requests the signals of a muscle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct SignalsRead {
     /// The muscle.
@@ -95,7 +95,7 @@ pub struct MeanSignals {
 
 fields!(MeanSignals { ticks, mean, supply, enabled });
 
-/// Something that happened, told without being asked.
+/// Something that happened, reported without a request.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Event {
     /// A fault stopped the device.

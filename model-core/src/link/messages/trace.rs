@@ -102,7 +102,7 @@ pub struct TraceInfo {
 
 fields!(TraceInfo { complete, records, first_tick, every_ticks, variables });
 
-/// Asks for values of a trace.
+/// Requests values of a trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TraceRead {
     /// Record to begin with.

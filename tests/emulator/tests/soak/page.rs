@@ -47,7 +47,7 @@ impl Figures {
         );
         for (words, within, row) in &self.rows {
             let Row { times, longest, samples, missing } = row;
-            // A recording that misses more than it tells ends the test.
+            // A recording that misses more than it reports ends the test.
             let _ = writeln!(
                 text,
                 "| {words} | {times} | {longest} | {within} | {samples} | 0 (missing: {missing}) |"

@@ -186,7 +186,7 @@ fn chosen(made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String
     })
 }
 
-/// The first steps, then steps drawn without regard to what they tell.
+/// The first steps, then steps drawn without regard to their information.
 fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String> {
     let muscle = MuscleDescription::parse(&made.description).map_err(message)?;
     let mut places = Places::new(&muscle, &rig()).map_err(message)?;

@@ -1,4 +1,4 @@
-//! How strong the effects of a trial have to be to have the size that it asks for.
+//! How strong the effects of a trial have to be to have the size that it requires.
 
 use crate::inject::{Injection, Parameter, Scale};
 use crate::spec::{Size, Spec};

@@ -32,7 +32,7 @@ pub struct Further {
 }
 
 /// How far these trials are a test.
-const DEVELOPED: &str = "\nThese are no independent test: the courses, the pairs and the lags beside other changes were developed on six of the muscles. \
+const DEVELOPED: &str = "\nThese are not an independent test: the courses, the pairs and the lags beside other changes were developed on six of the muscles. \
          Two constants were chosen by results of all of them: `named_shape_error` (0.1 instead of 0.05) and the longest lag that is tried.\n";
 
 fn rate<T>(of: &[&T], right: impl Fn(&T) -> bool) -> Rate {
@@ -71,7 +71,7 @@ fn two(t: &mut String, trials: &[together::Trial]) {
     }
     let _ = writeln!(
         t,
-        "\nBeside a lag, the rows in motion are scored without what is named already, and the settled rows are weighed with the lag taken out at any \
+        "\nBeside a lag, the rows in motion are scored without what is named already, and the settled rows are tested with the lag taken out at any \
          size. Of two lags one is named. Two changes of opposite sign may nearly cancel: then nothing is named, and the set holds \"none\".\n\n\
          ### Pairs of two classes that were not both named, 3 %\n\n| pair | n | both exact | both in the set |\n| --- | --- | --- | --- |"
     );

@@ -140,7 +140,7 @@ fn injected(text: &mut String, trials: &[Trial]) {
     }
 }
 
-/// Bounds that were set beforehand, and what was measured on all eleven muscles.
+/// Bounds that were set in advance, and what was measured on all eleven muscles.
 fn bounds(text: &mut String, trials: &[Trial], pairs: &[Pair], speed: Option<(usize, f64)>) {
     let at_three: Vec<&Trial> = trials.iter().filter(|t| t.effect.is_some() && t.percent == 3.0).collect();
     let n = at_three.len();
@@ -341,7 +341,7 @@ fn cylinder(text: &mut String, pairs: &[Pair]) {
     }
 }
 
-/// The page with its sections on tables and on the cylinder written anew, and the lines on seals in the table of bounds.
+/// The page with its sections on tables and on the cylinder rewritten, and the lines on seals in the table of bounds.
 pub fn replaced(page: &str, against_tables: &[Trial], pairs: &[Pair]) -> String {
     let mut of_pairs = String::new();
     cylinder(&mut of_pairs, pairs);

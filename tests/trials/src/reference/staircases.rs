@@ -19,7 +19,7 @@ pub enum Half {
 
 /// The muscles on which constants were chosen.
 const DEVELOPMENT: [&str; 6] = ["13cm", "27cm", "30cm", "cut100mm", "cut200mm", "cut300mm"];
-/// Shorter runs are no runs.
+/// Shorter runs are not runs.
 const FEWEST_ROWS: usize = 50;
 
 /// One run at a held length, SI.

@@ -1,4 +1,4 @@
-//! The same question with nothing but the table of then: fitted to the runs before, asked about the runs after.
+//! The same question with only the table of then: fitted to the runs before, compared with the runs after.
 
 use std::collections::BTreeMap;
 use std::path::Path;

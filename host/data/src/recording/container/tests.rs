@@ -72,7 +72,7 @@ fn columns_of_a_matrix_are_taken_by_their_numbers() {
 }
 
 #[test]
-fn what_is_no_recording_is_reported_with_the_column_and_the_remedy() {
+fn files_that_are_not_recordings_are_reported_with_the_column_and_the_remedy() {
     let cases = [
         ("dates.parquet", "time_s", "a column of dates where numbers are needed"),
         ("durations.parquet", "time_s", "a column of durations where numbers are needed"),

@@ -6,7 +6,7 @@ use super::unit;
 use crate::recording::{Campaign, Recording, white_noise};
 use crate::statistics::ranked;
 
-/// The longest stretch that is looked at, s: what lasts longer is how the bench was driven.
+/// The longest stretch that is examined, s: what lasts longer is how the bench was driven.
 const LONGEST: f64 = 10.0;
 /// About this many readings determine the highest pressure.
 const ROWS: usize = 100_000;
@@ -35,7 +35,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// `None` where there is no pressure to speak of.
+    /// `None` where there is no pressure worth a test.
     pub(super) fn of(campaign: &Campaign) -> Option<Self> {
         let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
         let stride = (campaign.samples() / ROWS).max(1);

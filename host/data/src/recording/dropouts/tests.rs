@@ -70,7 +70,7 @@ fn found(recording: Recording) -> Vec<Range<usize>> {
 }
 
 #[test]
-fn somebody_s_psi_are_found_and_bridged_while_the_muscle_strokes() {
+fn rows_in_psi_are_found_and_bridged_while_the_muscle_strokes() {
     let clean = recorded(120.0, 0.15, two_levels, as_read);
     let psi = |p: f64| p / PSI;
     // One in a stroke, one across a turn, one across the change of level.
@@ -136,14 +136,14 @@ fn a_real_step_moves_the_force_and_stays() {
 }
 
 #[test]
-fn a_slack_muscle_says_nothing() {
+fn a_slack_muscle_is_not_used() {
     // It pulls up to a sixth of contraction at 300 kPa, at the far end of its strokes it hangs.
     let clean = recorded(120.0, 0.3, two_levels, as_read);
     let force = clean.force.as_ref().expect("a force");
     let slack = 190..210;
     assert!(force[slack.clone()].iter().all(|f| f.abs() < 0.3), "it hangs there");
     assert_eq!(found(spoiled(clean.clone(), slack, |_| 40e3)), []);
-    // Neither does a force sensor at the end of its range.
+    // A force sensor at the end of its range is not used either.
     let mut clipped = clean;
     clipped.force.iter_mut().flatten().for_each(|f| *f = f.min(100.0));
     let top = 1205..1215;
@@ -152,7 +152,7 @@ fn a_slack_muscle_says_nothing() {
 }
 
 #[test]
-fn a_dead_weight_and_a_recording_without_force_say_nothing() {
+fn a_dead_weight_and_a_recording_without_force_show_nothing() {
     let mut hung = recorded(60.0, 0.15, two_levels, as_read);
     hung.force.iter_mut().flatten().for_each(|f| *f = 50.0);
     let hung = spoiled(hung, 300..330, |p| p / PSI);

@@ -9,11 +9,11 @@ use crate::short_number::short;
 pub(super) const ATMOSPHERE: f64 = 101_325.0;
 /// What an absolute sensor reads of a vented muscle, Pa: from a laboratory at 1500 m to a day of high pressure.
 const VENTED: (f64, f64) = (83e3, 107e3);
-/// Readings at the beginning of a file that are looked at.
+/// Readings at the beginning of a file that are read.
 const AT_START: usize = 20;
 /// The muscle is slack where its force is below this share of the largest.
 const SLACK: f64 = 0.03;
-/// Where the highest pressure is this many times the lowest, the lowest is no tested level.
+/// Where the highest pressure is this many times the lowest, the lowest is not a tested level.
 const FAR_ABOVE: f64 = 2.0;
 
 /// Adds the question if the pressure is absolute where its lowest readings are those of the atmosphere, and the muscle is slack there at the

@@ -37,7 +37,7 @@ impl Forms {
     }
 }
 
-/// The sign of remarks: another one than the number sign, where lines among the rows begin with it and are no rows.
+/// The sign of remarks: another one than the number sign, where lines among the rows begin with it and are not rows.
 pub(super) fn sign_of_remarks(lines: &[&[u8]], layout: &Layout) -> u8 {
     let first = |line: &&[u8]| line.trim_ascii_start().first().copied();
     let body = || lines[layout.data_at..].iter();
@@ -58,7 +58,7 @@ pub(super) struct Found {
     pub unknown: Vec<Note>,
 }
 
-/// Looks at the columns whose cells are no numbers; `cells` gives those of one column.
+/// Looks at the columns whose cells are not numbers; `cells` gives those of one column.
 pub(super) fn find<'a>(
     columns: &[SampleColumn],
     cells: impl Fn(usize) -> Vec<&'a str>,

@@ -8,7 +8,7 @@ use crate::recording::Quantity;
 use crate::recording::assemble::{LookupTable, same};
 use crate::recording::lookup::read_lookup;
 
-/// Files in a folder that are looked at, and their size in bytes: a list of runs is short.
+/// Files in a folder that are read, and their size in bytes: a list of runs is short.
 const FILES: usize = 200;
 const SIZE: u64 = 1 << 20;
 

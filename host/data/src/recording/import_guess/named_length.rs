@@ -9,7 +9,7 @@ use crate::recording::{Quantity, decimal};
 
 /// Units that are looked for in names.
 const UNITS: [&str; 3] = ["mm", "cm", "in"];
-/// Lengths in a name that are looked at: the first may be a diameter or the muscle's own length.
+/// Lengths in a name that are read: the first may be a diameter or the muscle's own length.
 const PLACES: usize = 3;
 /// A held length is at least this share of the longest one: no muscle shortens by more.
 const SHORTEST: f64 = 0.5;

@@ -104,7 +104,7 @@ fn in_lines(lines: &[String]) -> Option<Found> {
     if found.iter().any(|(value, ..)| (value - first).abs() > NOMINAL * first) {
         let all: Vec<String> = found.iter().map(|(value, ..)| short(value * 1e-3)).collect();
         return Some(Found::Unclear(format!(
-            "the lines above the table say several pressures ({} kPa): write that of the muscle under [constants]",
+            "the lines above the table contain several pressures ({} kPa): write that of the muscle under [constants]",
             all.join(", ")
         )));
     }
@@ -163,7 +163,7 @@ fn in_names(names: &[String]) -> Option<Found> {
         _ => {
             let said: Vec<String> = all[0].iter().map(|m| short(m.plain)).collect();
             return Some(Found::Unclear(format!(
-                "the names of the files say several pressures ({} {}): catch that of the muscle by file_name",
+                "the names of the files contain several pressures ({} {}): catch that of the muscle by file_name",
                 said.join(", "),
                 unit.name
             )));

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_derived_or_of_another_kind_is_no_quantity() {
+    fn names_of_derived_or_other_values_are_not_quantities() {
         for text in [
             "force_sd_N",
             "length_at_620kPa_mm",

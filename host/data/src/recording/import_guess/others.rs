@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::sample::{Sample, SampleColumn};
 
-/// Files that are looked at.
+/// Files that are read.
 const COMPARED: usize = 30;
 
 /// Files beside the first.
@@ -45,7 +45,7 @@ impl Range {
 }
 
 impl<'a> Others<'a> {
-    /// These files beside the first; they are read once, when something asks for their contents.
+    /// These files beside the first; they are read once, when something needs their contents.
     pub(super) fn of(files: &'a [PathBuf], sheet: Option<&'a str>) -> Self {
         Self { files, sheet, seen: OnceCell::new() }
     }

@@ -7,7 +7,7 @@ use super::{Guess, GuessedColumn, Note, Source, roles};
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 
-/// Columns that are named for a quantity and hold cells that are no numbers.
+/// Columns that are named for a quantity and hold cells that are not numbers.
 pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
     for column in &sample.columns {
         let Some(quantity) = column.named_for() else { continue };
@@ -23,7 +23,7 @@ pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
             "remove these cells, or write all decimals with the same sign"
         };
         let text = format!(
-            "{} looks like {}, but {} of {} cells are no numbers, such as `{}`: {advice}",
+            "{} looks like {}, but {} of {} cells are not numbers, such as `{}`: {advice}",
             column.header,
             quantity.name().replace('_', " "),
             column.texts,
@@ -117,7 +117,7 @@ pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
             .to_owned()
     } else if let Some((row, bits)) = wraps(time) {
         let size = 1_u64 << bits;
-        format!("a counter of {bits} bits began again behind row {row}: add {size} to the times that follow")
+        format!("a counter of {bits} bits overflowed after row {row}: add {size} to the times that follow")
     } else {
         "no column says which run a row belongs to: make one file of each run, or remove the rows that are given twice".to_owned()
     };

@@ -133,7 +133,7 @@ fn best(
     Some(first)
 }
 
-/// Whether all files hold the same value in this column, but for noise.
+/// Whether all files hold the same value in this column, except for noise.
 fn is_steady(column: &SampleColumn, others: &Others<'_>) -> bool {
     /// Share of the largest value: a regulator holds its supply within some per cent, and levels of a campaign differ by more.
     const SAME: f64 = 0.05;
@@ -246,7 +246,7 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
     let Some(suggested) = values::suggested(quantity, column, &others.ranges(header)) else {
         let (low, high) = column.range();
         return Err(format!(
-            "{header} looks like {what}, but neither its name nor its values ({} to {}) say the unit",
+            "{header} looks like {what}, but neither its name nor its values ({} to {}) show the unit",
             short(low),
             short(high)
         ));
@@ -257,7 +257,7 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
     } else {
         format!(" (or {})", suggested.others.join(", "))
     };
-    let check = format!("{header} does not say its unit; its values look like {unit}{others}");
+    let check = format!("{header} has no unit; its values look like {unit}{others}");
     Ok(GuessedUnit { unit, scale, check: Some(check), ..plain })
 }
 
@@ -407,6 +407,6 @@ fn what_is_missing(sample: &Sample, guess: &mut Guess) {
         guess.unknown.push("no column of force: a fit and a diagnosis need it".into());
     }
     if !sample.whole {
-        guess.checks.push(format!("the first {} rows were looked at", sample.rows).into());
+        guess.checks.push(format!("the first {} rows were read", sample.rows).into());
     }
 }

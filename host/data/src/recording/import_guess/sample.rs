@@ -22,9 +22,9 @@ use crate::recording::time_of_day;
 use crate::recording::workbook;
 use crate::statistics::{extremes, quantile};
 
-/// Bytes of a text that are looked at: some hundred thousand rows.
+/// Bytes of a text that are read: some hundred thousand rows.
 const LOOKED_AT: u64 = 32 << 20;
-/// Rows that are looked at.
+/// Rows that are read.
 const ROWS: usize = 300_000;
 /// Columns of a container have no form of their own.
 const PLAIN: Forms = Forms { decimal_comma: false, thousands: None, order: DateOrder::YearFirst };
@@ -123,7 +123,7 @@ impl SampleColumn {
     }
 
     /// Whether the numbers reach further below zero than above it, without the farthest twentieth on each side: codes for missing readings,
-    /// such as −999, are no readings.
+    /// such as −999, are not readings.
     pub(super) fn is_mostly_negative(&self) -> bool {
         let mut values: Vec<f64> = self.values().collect();
         !values.is_empty() && -quantile(&mut values, 0.05) > quantile(&mut values, 0.95)
@@ -202,7 +202,7 @@ impl Sample {
         if lines.first().is_some_and(|line| line.trim_ascii_end().contains(&b'\r')) {
             return Err(mac_lines());
         }
-        // Spreadsheets tell each other the delimiter in a first line, which the reader understands without help.
+        // Spreadsheets write the delimiter for each other in a first line, which the reader understands without help.
         let Some(mut layout) = Layout::of(&lines) else {
             return Err(Error::new(DataCode::RecordingNotText, "no table of numbers is found in this file").help(
                 "a recording has one row per reading, with equally many cells separated by commas, tabs, semicolons or blanks",
@@ -268,7 +268,7 @@ impl Sample {
         }
         if let Some(first) = again.first() {
             self.notes.push(format!(
-                "lines above the table stand again among the rows, first in line {first}, and are left out"
+                "lines above the table are repeated among the rows, first in line {first}, and are left out"
             ).into());
         }
         self.rows = rows.len();

@@ -29,7 +29,7 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) -> boo
     if times.len() == recordings || one_time {
         guess.columns.clear();
         guess.unknown.push(format!(
-            "{} of time and {recordings} of force: {recordings} recordings seem to stand side by side, but not with the same columns in the \
+            "{} of time and {recordings} of force: {recordings} recordings seem to be side by side, but not with the same columns in the \
              same order; make one file of each",
             if one_time { "one column".to_owned() } else { format!("{recordings} columns") }
         ).into());
@@ -68,7 +68,7 @@ fn describe(sample: &Sample, recordings: usize, step: usize, used: &mut [bool], 
     all.iter().for_each(|n| used[*n] = true);
     guess.side_by_side = Some((recordings, step));
     guess.checks.retain(|note| !note.is_on_choice());
-    guess.checks.push(format!("{recordings} recordings stand side by side, {step} columns apart").into());
+    guess.checks.push(format!("{recordings} recordings are side by side, {step} columns apart").into());
     if own.iter().chain(&all).any(|n| sample.columns[*n].missing > 0) {
         guess.skip_missing = true;
         guess.checks.push("some of them lack numbers in some rows, which are left out there".into());

@@ -88,7 +88,7 @@ fn moves_the_force(sample: &Sample, guess: &Guess) -> bool {
         && values::force_against(&stroke.numbers, &force.numbers, None).is_some_and(|r| r.abs() > SHOWN)
 }
 
-/// A strain that grows as the muscle gets longer, from a zero of its own, is no contraction, whatever its name says.
+/// A strain that grows as the muscle gets longer, from a zero of its own, is not a contraction, whatever its name says.
 fn contraction(sample: &Sample, guess: &mut Guess) {
     let is_one = |c: &&GuessedColumn| c.quantity == Quantity::Contraction;
     let Some(header) = guess.columns.iter().find(is_one).map(|c| c.header.clone()) else { return };

@@ -77,14 +77,14 @@ pub(super) fn interval(column: &SampleColumn) -> Option<f64> {
     Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Whether the values increase from row to row but for at most one step in twenty, as time does that begins again with each run.
+/// Whether the values increase from row to row except for at most one step in twenty, as time does that begins again with each run.
 pub(super) fn increases(column: &SampleColumn) -> bool {
     let steps = column.numbers.windows(2).count();
     let up = column.numbers.windows(2).filter(|w| w[1] > w[0]).count();
     column.is_numeric() && steps >= 9 && 20 * (steps - up) <= steps
 }
 
-/// Whether values count rows: whole numbers in steps of one, which say nothing about the time.
+/// Whether values count rows: whole numbers in steps of one, which do not show the time.
 pub(super) fn counts_rows(column: &SampleColumn) -> bool {
     column.numbers.windows(2).all(|w| w[1] - w[0] == 1.0) && column.numbers.iter().all(|v| v.fract() == 0.0)
 }

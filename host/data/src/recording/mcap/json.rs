@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::values::{LONGEST_ARRAY, Values};
 
-/// Reads one message; `None` where it is no JSON object.
+/// Reads one message; `None` where it is not a JSON object.
 pub(super) fn read(message: &[u8], values: &mut Values) -> Option<()> {
     let value: Value = serde_json::from_slice(message).ok()?;
     value.as_object()?;

@@ -158,7 +158,7 @@ impl<'a> Topics<'a> {
         };
         let Some(decoder) = &topic.decoder else { return Ok(true) };
         if data.len() > LARGEST_MESSAGE {
-            topic.give_up(format!("messages of {} bytes, which are no readings of sensors", data.len()));
+            topic.give_up(format!("messages of {} bytes, which are not readings of sensors", data.len()));
             return Ok(true);
         }
         let read = match decoder {
@@ -168,7 +168,7 @@ impl<'a> Topics<'a> {
         if read.is_none() || topic.values.too_wide {
             topic.values.abandon();
             let reason = if topic.values.too_wide {
-                "messages of more than 1000 numbers, which are no readings of sensors".into()
+                "messages of more than 1000 numbers, which are not readings of sensors".into()
             } else {
                 let number = topic.values.rows + 1;
                 format!("messages in {}, of which number {number} does not fit its definition", topic.kind)

@@ -145,7 +145,7 @@ impl Search<'_> {
                 return Found::Hold(Hold { start: first, end: last, stroke: level });
             }
         }
-        // The stretch includes what of the motion before and after stays within the threshold; that is no rest.
+        // The stretch includes what of the motion before and after stays within the threshold; that is not a rest.
         let tolerance = scale.rest_tolerance();
         let still = |i: &usize| (smooth[*i] - level).abs() <= tolerance;
         let (Some(first), Some(last)) = ((start..end).find(still), (start..end).rev().find(still)) else {

@@ -22,7 +22,7 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Rates from parabolas through a window about each sample, by least squares. The window is as wide as noise asks for and
+    /// Rates from parabolas through a window about each sample, by least squares. The window is as wide as noise requires and
     /// never reaches across a reversal or into or out of a hold, where speed jumps. A held length has no speed: what its slope
     /// shows is noise, or a frame that yields.
     #[must_use]

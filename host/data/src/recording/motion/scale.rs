@@ -52,7 +52,7 @@ fn spread(n: usize) -> f64 {
     MOTION_NOISE * (2.0 * (n.max(2) as f64).ln()).sqrt() + 1.0
 }
 
-/// The scale of a stroke, and the stroke smoothed as far as its reversals allow. Less than `least`, m, is no motion.
+/// The scale of a stroke, and the stroke smoothed as far as its reversals allow. Less than `least`, m, is not motion.
 pub(super) fn of_stroke(stroke: &[f64], least: f64) -> (Scale, Vec<f64>) {
     let noise = coloured_noise(stroke);
     let raw = raise(stroke, (spread(stroke.len()) * noise).max(least));
@@ -71,7 +71,7 @@ pub(super) fn of_stroke(stroke: &[f64], least: f64) -> (Scale, Vec<f64>) {
 /// than two per cent of its pressure on purpose.
 pub(super) fn of_pressure(pressure: &[f64]) -> Scale {
     let top = pressure.iter().fold(0.0, |m: f64, p| m.max(p.abs())).max(MOTION_PRESSURE_FLOOR);
-    // Settled readings of a staircase differ by whole steps; that is no noise, and no pressure sensor is that bad.
+    // Settled readings of a staircase differ by whole steps; that is not noise, and no pressure sensor is that bad.
     let noise = coloured_noise(pressure).min(PRESSURE_NOISE_MOST * top);
     let threshold =
         (spread(pressure.len()) * noise).clamp(MOTION_PRESSURE_SHARE * top, MOTION_PRESSURE_MOST * top);

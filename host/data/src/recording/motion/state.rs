@@ -1,4 +1,4 @@
-//! What each sample tells: whether the length is held, whether the direction is in doubt, whether the pressure ramps.
+//! What each sample shows: whether the length is held, whether the direction is in doubt, whether the pressure ramps.
 
 use std::ops::Range;
 
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stroke_after_ramps_of_pressure_goes_its_own_way() {
+    fn the_stroke_after_ramps_of_pressure_has_its_own_direction() {
         for seed in 0..20 {
             for (returns, on) in [(true, -1), (false, 1), (false, -1), (true, 1)] {
                 let (motion, state) = state_of(&after_ramps(seed, returns, f64::from(on)));

@@ -1,4 +1,4 @@
-//! Motions whose directions are known, with noise: what is found must be the truth but for samples that noise hides.
+//! Motions whose directions are known, with noise: what is found must be the truth except for samples that noise hides.
 
 use proptest::prelude::*;
 
@@ -213,7 +213,7 @@ fn slow_motion_under_noise_turns_within_what_noise_hides() {
 }
 
 #[test]
-fn direction_is_kept_through_a_rest_and_changes_when_motion_goes_on() {
+fn direction_is_kept_through_a_rest_and_changes_when_motion_continues() {
     let path = [
         Piece::Rest(3.0),
         Piece::Go(5.0 * MM, 1.0 * MM),
@@ -304,7 +304,7 @@ fn settled_points_of_a_staircase_turn_between_the_last_up_and_the_first_down() {
 }
 
 #[test]
-fn what_the_file_says_stands() {
+fn a_direction_in_the_file_is_kept() {
     let mut truth = carry_out(&loops(1, 5.0 * MM, 1.0 * MM), 10.0, 0.0, 0.0, 1);
     truth.recording.direction = Some(truth.direction.iter().map(|_| -1).collect());
     let found = Motion::of(&truth.recording);

@@ -146,7 +146,7 @@ impl Track<'_> {
         if step > SHARP_STEP * self.noise || right - left < SHARP_SAMPLES {
             return self.sharp_turn(k, first, last, before.sign());
         }
-        // Samples close to the extremum may belong to either side; far ones tell little about it.
+        // Samples close to the extremum may belong to either side; far ones show little about it.
         let near = self.tolerance();
         let far = (LINE_REACH * self.threshold)
             .min(LINE_STROKE_SHARE * before.amplitude())

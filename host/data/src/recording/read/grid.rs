@@ -75,7 +75,7 @@ fn long_table(text: &[u8], description: &Import, grid: &Grid) -> Result<(String,
         return Err(invalid("grid.columns catches nothing")
             .help("name what a heading tells, such as 'F_(?<length_mm>[0-9.]+)mm'"));
     }
-    // Index of each column of the grid, and what its heading tells.
+    // Index of each column of the grid, and what its heading gives.
     let mut columns: Vec<(usize, Vec<String>)> = Vec::new();
     for (index, name) in header.names.iter().enumerate() {
         if let Some(caught) = pattern.captures(name) {

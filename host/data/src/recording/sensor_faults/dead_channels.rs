@@ -69,7 +69,7 @@ fn is_dead(r: &Recording, channel: Channel, usual: &Usual) -> bool {
         quantile(&mut values, 0.95) - quantile(&mut values, 0.05)
     };
     match channel {
-        // Without pressure a muscle does not pull. A pressure without any scatter is no measurement: less force is enough, if no other
+        // Without pressure a muscle does not pull. A pressure without any scatter is not a measurement: less force is enough, if no other
         // recording shows it.
         Channel::Pressure => {
             let pull = |i: usize| force[i] - usual.expected.floor().max(0.0);
@@ -82,7 +82,7 @@ fn is_dead(r: &Recording, channel: Channel, usual: &Usual) -> bool {
         }
         Channel::Force => {
             let expected = |i: usize| usual.expected.at(r, i) - middle;
-            // A force without any scatter is no measurement; one that scatters may be that of a slack muscle.
+            // A force without any scatter is not a measurement; one that scatters may be that of a slack muscle.
             let least = if spread > 0.0 { usual.noticeable(PULLS) } else { usual.noticeable_unusually() };
             share(&|i| expected(i) > least) > ROWS
         }

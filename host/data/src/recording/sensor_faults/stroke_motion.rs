@@ -5,7 +5,7 @@ use crate::statistics::median;
 
 /// A motion exceeds this many standard deviations of a reading of the stroke.
 const MOTION: f64 = 6.0;
-/// A muscle is slow where it takes this many times as many rows to move as in the median row, of which some hundred are looked at.
+/// A muscle is slow where it takes this many times as many rows to move as in the median row, of which some hundred are examined.
 const SLOW: f64 = 3.0;
 const SAMPLED: usize = 200;
 /// A muscle that does not move in as many rows rests.

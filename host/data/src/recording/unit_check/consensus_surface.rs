@@ -27,7 +27,7 @@ const BELOW: f64 = 0.3;
 /// The surface is trusted at a stroke where the recordings that it is fitted to are, in the median, nearer to it than this share of the
 /// usual largest force: half of what makes another recording inconsistent. A steep beginning of the stroke is more than it follows.
 const FOLLOWED: f64 = 0.5 * FAR_OFF;
-/// Parts of the strokes' range in which that is looked at.
+/// Parts of the strokes' range in which that is tested.
 const PARTS: usize = 33;
 /// Sections of a recording over which residuals are averaged.
 const SECTIONS: usize = 10;

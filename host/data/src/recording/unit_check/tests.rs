@@ -116,9 +116,9 @@ fn two_mistakes_in_five_recordings_are_both_found() {
     assert_eq!(there, [1, 4]);
 }
 
-/// What differs for a reason is no mistake: a vented bench, a dead cell, a gauge at another level, two recordings alone.
+/// What differs for a reason is not a mistake: a vented bench, a dead cell, a gauge at another level, two recordings alone.
 #[test]
-fn what_is_no_known_mistake_is_not_called_one() {
+fn differences_with_a_reason_are_not_reported_as_mistakes() {
     let vented = |offset: f64| Recording { force: Some(vec![offset; 240]), ..loops("tare", 0.0) };
     for offset in [0.0, 5.0, -5.0, 40.0] {
         let mut with_tares = campaign();

@@ -46,7 +46,7 @@ pub(super) fn kind(bytes: &[u8]) -> Result<Kind> {
         left = left.checked_sub(unpacked).ok_or_else(too_large)?;
     }
     kind.ok_or_else(|| {
-        Error::new(DataCode::RecordingContainer, "this ZIP archive is no Excel or OpenDocument workbook")
+        Error::new(DataCode::RecordingContainer, "this ZIP archive is not an Excel or OpenDocument workbook")
             .help("unpack it and name the files in it, or save the sheet as .xlsx or CSV")
     })
 }

@@ -40,7 +40,7 @@ fn lines_above_the_table_and_other_names_are_guessed() {
 }
 
 #[test]
-fn what_is_no_recording_is_reported_with_the_remedy() {
+fn workbooks_that_are_not_recordings_are_reported_with_the_remedy() {
     let message = |name: &str, reader: &Reader<'_>| {
         let error = reader.file(&fixture(name)).expect_err(name);
         format!("{error} | {}", error.advice().unwrap_or_default())

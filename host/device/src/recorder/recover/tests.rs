@@ -39,7 +39,7 @@ fn samples(bytes: &[u8]) -> u64 {
 }
 
 #[test]
-fn a_whole_file_goes_over_whole() {
+fn a_whole_file_is_sent_whole() {
     let (data, end) = recording();
     for bytes in [data.clone(), [data, end].concat()] {
         let (out, tally) = copied(&bytes);
@@ -93,7 +93,7 @@ fn a_hole_of_zeros_is_stepped_over() {
 }
 
 #[test]
-fn a_damaged_file_is_kept_and_the_loss_said() {
+fn a_damaged_file_is_kept_and_the_loss_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (mut data, _) = recording();
@@ -117,7 +117,7 @@ fn a_damaged_file_is_kept_and_the_loss_said() {
 }
 
 #[test]
-fn what_is_no_recording_or_whole_is_left_alone() {
+fn files_that_are_complete_or_not_recordings_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let (data, end) = recording();

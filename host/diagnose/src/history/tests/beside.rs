@@ -167,7 +167,7 @@ fn a_pull_that_begins_softly_is_no_reading_of_a_slack_muscle() {
 }
 
 #[test]
-fn what_a_slack_muscle_excludes_cannot_be_hidden() {
+fn effects_that_a_slack_muscle_excludes_cannot_be_hidden() {
     let diagnosed = |bench| {
         diagnose(&recorded(bench, 560), &geometry(), &Options::default()).expect("a diagnosis of staircases")
     };

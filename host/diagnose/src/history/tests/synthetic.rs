@@ -261,7 +261,7 @@ fn loops_of_stroke_have_no_history() {
 }
 
 #[test]
-fn one_mounting_tells_a_share_but_no_stress_free_pressure() {
+fn one_mounting_determines_a_share_but_no_stress_free_pressure() {
     let mut c = campaign(Truth { runs: 6, ..MEMORY }, 7);
     c.recordings.drain(..6);
     c.recordings.truncate(6);

@@ -60,7 +60,7 @@ fn campaign_after(effects: &[FittedEffect], earlier_load: Option<EarlierLoad>) -
 }
 
 #[test]
-fn a_table_carries_the_memory_and_foretells_unseen_runs() {
+fn a_table_carries_the_memory_and_predicts_unseen_runs() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let campaign = campaign(&TRUTH);
     let file = table_fit::table(&campaign, &muscle).expect("fitted").expect("staircases");
@@ -74,9 +74,9 @@ fn a_table_carries_the_memory_and_foretells_unseen_runs() {
     assert_eq!(settled.with_memory, recorded.with_memory);
 }
 
-/// A mounting that is 0.4 mm from where it is said to be: with the length that suits its readings most of its error is gone.
+/// A mounting that is 0.4 mm from its stated place: with the length that suits its readings most of its error is gone.
 #[test]
-fn what_a_wrong_length_adds_to_the_error_of_an_unseen_mounting_is_distinguished() {
+fn the_error_by_a_wrong_length_of_an_unseen_mounting_is_separated() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let mut campaign = campaign(&TRUTH);
     let unseen = |campaign: &Campaign| {
@@ -151,7 +151,7 @@ fn friction_that_grows_with_the_radius_is_in_the_table() {
 }
 
 #[test]
-fn what_the_tables_numbers_scatter_by_is_stored_with_them() {
+fn the_uncertainty_of_the_table_is_stored_with_it() {
     let muscle = MuscleDescription::parse(DESCRIPTION).expect("a description");
     let file = table_fit::table(&campaign(&TRUTH), &muscle).expect("fitted").expect("staircases");
     let uncertainty = file.about.uncertainty.as_ref().expect("a jackknife over runs");

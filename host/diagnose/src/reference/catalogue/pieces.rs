@@ -32,7 +32,7 @@ fn by_state(cells: &Cells, residual: &DVector<f64>) -> Vec<(Place, f64)> {
         .collect()
 }
 
-/// Correlation of neighbours along one coordinate; zero where there are too few to tell.
+/// Correlation of neighbours along one coordinate; zero where there are too few to decide.
 fn of_neighbours(states: &[(Place, f64)], coordinate: usize) -> f64 {
     let at: BTreeMap<Place, f64> = states.iter().copied().collect();
     let next = |place: &Place| {
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_all_states_show_alike_is_few_pieces() {
+    fn an_error_common_to_all_states_counts_as_few_pieces() {
         let pieces = of_states(&states(|_| 1.0));
         assert!((1.0..2.0).contains(&pieces), "{pieces}");
         // An error of each level of its own, with no order among levels: six pieces.

@@ -59,7 +59,7 @@ fn moving(cells: &[Cell], difference: &[f64], variance: &[f64]) -> BTreeMap<(u32
 
 /// Which cells belong to a rest in which friction has slipped. `half_gap`: friction of each cell, N.
 ///
-/// What a change does to all rests, as creep does, is common to them; what the strokes beside a rest show as well is no slip. A slip is what a
+/// What a change does to all rests, as creep does, is common to them; what the strokes beside a rest show as well is not a slip. A slip is what a
 /// rest has of its own beyond both.
 pub(super) fn slipped(cells: &[Cell], difference: &[f64], variance: &[f64], half_gap: &[f64]) -> Vec<bool> {
     let beside = moving(cells, difference, variance);
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_all_rests_or_the_strokes_of_a_level_show_is_a_change() {
+    fn a_difference_of_all_rests_or_of_a_level_is_not_a_slip() {
         assert!(slips(|_, rest| if rest { 8.0 } else { 0.0 }).is_empty());
         assert!(slips(|l, _| if l == 2 { 8.0 } else { 0.0 }).is_empty());
     }

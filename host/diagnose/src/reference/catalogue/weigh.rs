@@ -187,7 +187,7 @@ fn with_own_error(
     Inexact { fit: best.unwrap_or(found), logs }
 }
 
-/// For each law, those that these cells do not tell from it.
+/// For each law, those that these cells do not distinguish from it.
 fn alike(metric: &Metric<'_>, fits: &[Fit]) -> Vec<Vec<usize>> {
     let images: Vec<DVector<f64>> = fits.iter().map(|f| metric.apply(&f.trace)).collect();
     let product = |i: usize, k: usize| fits[i].trace.dot(&images[k]);

@@ -10,7 +10,7 @@ pub(super) const INTRODUCTION: &str = "# Trials of changes\n\n`host diagnose AFT
     ```text\ncargo run --release -p trials -- reference -o DIR --page docs/src/proof-reference.md\n```\n\n";
 
 /// The bounds as they were set.
-pub(super) const BOUNDS: &str = "Bounds set beforehand, at 3 %: class right in 85 %, exact in 75 %, truth in the set in 95 %, size within 20 % in 90 %; \
+pub(super) const BOUNDS: &str = "Bounds set in advance, at 3 %: class right in 85 %, exact in 75 %, truth in the set in 95 %, size within 20 % in 90 %; \
     unchanged pairs named in 2 % at most; pairs of seals: main class in 80 %, no rerun named; 60,000 rows in 5 s on two cores.\n\n";
 
 /// The section on added changes.

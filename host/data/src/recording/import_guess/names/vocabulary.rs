@@ -136,7 +136,7 @@ pub(super) const COMMANDED: &[&str] = &[
 ];
 /// Words of a length at rest.
 pub(super) const AT_REST: &[&str] = &["rest", "initial", "l0", "ruhe", "ruhelaenge", "resting"];
-/// Words of what is derived from a quantity, or of another kind: a standard deviation is no force, and a diameter no stroke.
+/// Words of what is derived from a quantity, or of another kind: a standard deviation is not a force, and a diameter no stroke.
 pub(super) const DERIVED: &[&str] = &[
     "sd",
     "std",
@@ -175,7 +175,7 @@ pub(super) const DERIVED: &[&str] = &[
     "dicke",
     "breite",
 ];
-/// Words that say nothing about which quantity it is.
+/// Words that do not show which quantity it is.
 pub(super) const NEUTRAL: &[&str] = &[
     "measured", "actual", "ist", "istwert", "gauge", "mounted", "active", "muscle", "sensor", "cell",
     "value", "channel", "data", "analog", "input", "current", "pam", "mean", "avg", "abs", "in", "the", "of",
