@@ -17,7 +17,7 @@ use super::verdict::{
 };
 use pam_data::error::Result;
 use pam_data::recording::Campaign;
-use pam_fit::bench::{BenchName, Candidate as Law};
+use pam_fit::bench::Candidate as Law;
 use pam_fit::checks::{self, Checks, Measured};
 
 mod leak;
@@ -62,18 +62,18 @@ impl Fault {
             .map(|(at, v)| v + measured.half_width(at).copysign(*v))
             .collect();
         let largest = peak(rows.contexts(), &measured.parameters);
-        let is_play = measured.fault == BenchName::Backlash;
+        let delays = Law::Bench(measured.fault).traits().delays_reversals;
         // At a reversal even the least play delays the whole jump of friction; how much it may hide is counted where the muscle slides.
-        let sliding: Vec<Context<f64>> = if is_play {
+        let sliding: Vec<Context<f64>> = if delays {
             rows.contexts().iter().map(|c| Context { friction: 0.0, ..*c }).collect()
         } else {
             Vec::new()
         };
-        let at_most = if is_play { peak(&sliding, &further) } else { peak(rows.contexts(), &further) };
-        let stands = is_play && measured.is_sure() && material(peak(&sliding, &measured.parameters));
+        let at_most = if delays { peak(&sliding, &further) } else { peak(rows.contexts(), &further) };
+        let stands = delays && measured.is_sure() && material(peak(&sliding, &measured.parameters));
         let finding = if !material(largest) || !(measured.is_sure() || measured.is_likely()) {
             Finding::Absent
-        } else if measured.is_sure() && !is_play {
+        } else if measured.is_sure() && !delays {
             Finding::Present
         } else {
             // The recordings decide where chance could still be the cause, and on a play, which cannot be removed from a reading.
@@ -164,7 +164,7 @@ impl BenchChecks {
 
     /// Whether the corrected stroke follows the force, as the muscle does in a frame that gives.
     pub(super) fn corrects_the_stroke(&self) -> bool {
-        self.with(Finding::Present).any(|f| f.measured.fault == BenchName::RigCompliance)
+        self.with(Finding::Present).any(|f| f.law().traits().stroke_follows_force)
     }
 
     /// Whether a check of the bench settles an effect, so that the recordings need not.

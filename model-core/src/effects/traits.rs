@@ -106,6 +106,10 @@ pub struct Traits {
     pub between_recordings: bool,
     /// Whether closed valves show it: their pressure falls.
     pub loses_air: bool,
+    /// Whether it delays each reversal: a reading cannot be freed of it, since the delay is in the motion, not in the reading.
+    pub delays_reversals: bool,
+    /// Whether it adds a stroke that follows the force, so that a corrected stroke differs between the directions.
+    pub stroke_follows_force: bool,
     /// Whether its law is made from the slope and friction of the base model, which a base that was fitted without it has partly taken up:
     /// it is then seen from a base that was fitted beside it.
     pub made_from_base: bool,
@@ -130,6 +134,8 @@ impl Traits {
             imitates: None,
             between_recordings: false,
             loses_air: false,
+            delays_reversals: false,
+            stroke_follows_force: false,
             made_from_base: false,
             changed: None,
             consistent: always,
@@ -159,6 +165,16 @@ impl Traits {
     #[must_use]
     pub const fn loses_air(self) -> Self {
         Self { loses_air: true, ..self }
+    }
+    /// The same that delays each reversal.
+    #[must_use]
+    pub const fn delays_reversals(self) -> Self {
+        Self { delays_reversals: true, ..self }
+    }
+    /// The same with a stroke that follows the force.
+    #[must_use]
+    pub const fn stroke_follows_force(self) -> Self {
+        Self { stroke_follows_force: true, ..self }
     }
     /// The same, made from the slope and friction of the base model.
     #[must_use]

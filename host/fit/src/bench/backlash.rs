@@ -42,6 +42,7 @@ impl Effect for Backlash {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::RigidBar)
+        .delays_reversals()
         .made_from_base()
         .check(BenchCheck::RigidBar)
         .consistent(no_looser_than_free)

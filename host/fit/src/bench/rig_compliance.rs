@@ -37,6 +37,7 @@ impl Effect for RigCompliance {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::RigidBar)
+        .stroke_follows_force()
         .made_from_base()
         .check(BenchCheck::RigidBar)
         .consistent(gives_alike)

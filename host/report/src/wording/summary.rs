@@ -123,6 +123,8 @@ fn header(s: &mut String, d: &Diagnosis) {
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
             Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) =>
                 "NOISE WITH MEMORY: the error does not repeat under the same conditions, and no effect of the library fits it.",
+            Verdict::Unexplained if !d.missing.is_empty() =>
+                "UNEXPLAINED: no effect of the library explains the model's error above the noise. What checks of the bench measured is below.",
             Verdict::Unexplained =>
                 "UNEXPLAINED: the model has an error above the noise that no effect of the library explains well enough to be named.",
         }
@@ -161,10 +163,12 @@ fn effect(s: &mut String, m: &Missing) {
             writeln!(s, "  these recordings do not distinguish it from: {}", m.confusable_with.join(", "));
     }
     if m.correction {
-        let _ = writeln!(
-            s,
-            "  an error of the bench, not of the muscle: it corrects the data and is not sent to the controller"
-        );
+        let remedy = if m.checked && m.share_explained == 0.0 {
+            "the recordings cannot be corrected for it, so mend the bench"
+        } else {
+            "it corrects the data and is not sent to the controller"
+        };
+        let _ = writeln!(s, "  an error of the bench, not of the muscle: {remedy}");
     }
 }
 
