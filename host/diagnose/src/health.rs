@@ -13,8 +13,8 @@ use model_core::link::messages::{COLUMNS, HealthSums, LAGGED, SHAPES, SUMS, Shap
 use nalgebra::{DMatrix, DVector};
 
 use crate::criteria::table_health::{DISTINCT_CHANGES, HEALTH_CORRELATION, SECOND_CHANGE};
-use crate::criteria::uncertainty::NORMAL_95;
 use crate::reference::shapes::Change;
+use pam_data::statistics::NORMAL_95;
 
 /// What is known of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

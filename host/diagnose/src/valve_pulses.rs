@@ -23,7 +23,7 @@ pub(crate) struct ValvePulses {
 /// The median distance between readings, s.
 pub(crate) fn interval(recording: &Recording) -> f64 {
     let mut steps: Vec<f64> = recording.time.windows(2).map(|w| w[1] - w[0]).collect();
-    pam_fit::numerics::median(&mut steps)
+    pam_data::statistics::median(&mut steps)
 }
 
 impl ValvePulses {

@@ -44,8 +44,6 @@ pam_data::criteria! {
     CHANGE_POINT_RATIO: f64 = 7.35, "LR", "1", Published("-2 ln(1 - sqrt 0.95): B. E. Hansen, Econometrica 68 (2000) 575-603, doi 10.1111/1468-0262.00124");
     /// Change points over the campaign that are tried for a second maximum of the likelihood.
     CHANGE_POINT_SCAN: usize = 250, "n_scan", "1", Cost;
-    /// Standard deviations of an interval of 95 %.
-    NORMAL_95: f64 = 1.96, "z", "1", Convention("normal quantile");
     /// Calibration of a model weight w: logit p = A + B logit(w) + C logit(explained).
     CALIBRATION: ([f64; 3]) = [0.03, 0.75, 0.17], "A, B, C", "1", Trials("432 names of a development and an opened set: on trials left out, log score 0.330 (0.351 without) and calibration error 0.049 (0.084). Learned on the development set alone, 0.321 (0.353) and 0.061 (0.097) on the opened one. cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET...");
     /// Model weights and shares are kept this far from certainty.

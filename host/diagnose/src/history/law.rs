@@ -14,6 +14,7 @@
 //! The law was found on isometric recordings at four lengths; under motion it is a prediction.
 
 use pam_data::statistics::extremes;
+use pam_fit::numerics::bspline::CubicSplines;
 use rayon::prelude::*;
 
 use super::campaign::Points;
@@ -24,7 +25,6 @@ use super::criteria::{
 };
 use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
-use super::spline::Spline;
 
 /// Assumptions about times that are not recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub(super) struct Choice {
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
     pub points: &'a Points,
-    pub spline: Spline,
+    pub spline: CubicSplines,
     /// `P_th,m`, kPa.
     pub thresholds: Vec<f64>,
     /// Pauses between runs, s, with the steps of the states over each.

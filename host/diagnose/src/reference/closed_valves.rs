@@ -21,6 +21,7 @@ use super::criteria::{
 use super::motion;
 use super::runs::{Run, Runs};
 use super::shapes::{CHANGES, Change};
+use pam_data::statistics::{deviation_from_median, median};
 use pam_fit::bench::Candidate;
 
 /// A rest between two steps.
@@ -108,9 +109,7 @@ fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
             |f: &dyn Fn(&(f64, f64)) -> f64| beside.iter().zip(&weights).map(|(r, w)| w * f(r)).sum::<f64>();
         rate = -sum(&|r| r.0 * r.1) / sum(&|r| r.0 * r.0);
         let residuals: Vec<f64> = beside.iter().map(|(p, e)| (e + rate * p).abs()).collect();
-        let mut sorted = residuals.clone();
-        sorted.sort_by(f64::total_cmp);
-        let limit = LOSS_CLIP * 1.4826 * sorted[sorted.len() / 2];
+        let limit = LOSS_CLIP * deviation_from_median(median(&mut residuals.clone()));
         weights = residuals.iter().map(|r| if *r > limit { limit / r } else { 1.0 }).collect();
     }
     rate.is_finite().then_some(rate)

@@ -6,7 +6,7 @@
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 use nalgebra::{DMatrix, DVector};
-use pam_data::statistics::{extremes, range};
+use pam_data::statistics::{extremes, quantile, range};
 
 use super::answer::NotComparable;
 use super::criteria::{
@@ -16,7 +16,7 @@ use super::criteria::{
 };
 use super::motion::turning;
 use super::runs::{Mounted, Run, Runs, mounted_anew};
-use super::strokes::{ends, percentile};
+use super::strokes::ends;
 use super::surface::{Surface, bin};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
@@ -25,7 +25,8 @@ use pam_fit::table_file::TableFile;
 /// Whether something beside the pressure moves the stroke: at one pressure it takes values further apart than a held length does,
 /// smoothly and back and forth. A mounting that gives with the force, and a noisy sensor, do not.
 pub(super) fn swings(r: &Recording) -> bool {
-    let travel = percentile(&r.stroke, STROKES_ENDS.1) - percentile(&r.stroke, STROKES_ENDS.0);
+    let mut strokes = r.stroke.clone();
+    let travel = quantile(&mut strokes, STROKES_ENDS.1) - quantile(&mut strokes, STROKES_ENDS.0);
     if !(travel > recording::HELD) {
         return false;
     }
@@ -37,7 +38,7 @@ pub(super) fn swings(r: &Recording) -> bool {
         return false;
     }
     let turns = turning(&r.stroke, COMBINED_SWING * travel, 0.0).windows(2).filter(|w| w[0] != w[1]).count();
-    let (low, high) = (percentile(&r.pressure, 0.0), percentile(&r.pressure, 1.0));
+    let (low, high) = extremes(&r.pressure);
     let mut at = vec![Vec::new(); COMBINED_LENGTHS];
     for (p, x) in r.pressure.iter().zip(&r.stroke) {
         at[bin(*p, low, high, COMBINED_LENGTHS)].push(*x);

@@ -5,6 +5,7 @@ use super::interpolate;
 use super::runs::{Run, Runs};
 use super::spline::{Point, Spline};
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::statistics::midpoint_median;
 
 /// One mounting's curves on the common pressures.
 #[derive(Debug, Clone, Default)]
@@ -135,13 +136,9 @@ impl Surface {
         let at = 0.95 * last as f64;
         let (i, share) = (at as usize, at.fract());
         let high = all[i] + share * (all[(i + 1).min(last)] - all[i]);
-        let kept: Vec<f64> = all.into_iter().filter(|s| *s > 0.3 * high).collect();
-        let n = kept.len();
-        self.usual_slope = match n {
-            0 => high.abs().max(f64::MIN_POSITIVE),
-            n if n % 2 == 1 => kept[n / 2],
-            n => (kept[n / 2 - 1] + kept[n / 2]) / 2.0,
-        };
+        let mut kept: Vec<f64> = all.into_iter().filter(|s| *s > 0.3 * high).collect();
+        self.usual_slope =
+            if kept.is_empty() { high.abs().max(f64::MIN_POSITIVE) } else { midpoint_median(&mut kept) };
     }
 
     /// A tabulated curve at a pressure.

@@ -1,5 +1,6 @@
 //! Both campaigns as cells: what AFTER differs by from BEFORE at the same level, place, direction and speed.
 
+use pam_data::statistics::{deviation_from_median, median};
 use std::collections::BTreeMap;
 
 use model_core::braid::Braid;
@@ -91,8 +92,7 @@ impl States {
                 speeds.push(context.speed.abs());
             }
         }
-        speeds.sort_by(f64::total_cmp);
-        let speed = speeds.get(speeds.len() / 2).copied().unwrap_or(1.0);
+        let speed = if speeds.is_empty() { 1.0 } else { median(&mut speeds) };
         Self { ends, speed }
     }
 
@@ -143,8 +143,7 @@ struct Level {
 /// A variance in which single cells, as after a restart, do not count with all they have.
 fn robust(deviations: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let usual = 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    let usual = deviation_from_median(median(&mut sizes));
     let square: f64 = deviations.iter().map(|d| d.clamp(-4.0 * usual, 4.0 * usual).powi(2)).sum();
     square / deviations.len().max(1) as f64
 }
