@@ -21,10 +21,14 @@ pam_data::criteria! {
     SMOOTHNESS_STATIC: f64 = 0.01, "λ_s", "1", Measured("chosen on six muscles; flat optimum");
     /// Weight of squared spline coefficients.
     RIDGE: f64 = 1e-6, "λ_0", "1", Derived("numerical rank only");
+    /// Knots of a curve below the highest pressure, about: their distance is 1, 2 or 5 times a power of ten.
+    KNOTS: f64 = 13.0, "n_knot", "1", Judgement;
     /// The tangent of the threshold starts at this share of the highest pressure.
     THRESHOLD_FROM: f64 = 0.84, "p_1", "1", Derived("the straight part of the pull");
     /// The tangent of the threshold ends at this share of the highest pressure.
     THRESHOLD_TO: f64 = 0.94, "p_2", "1", Derived("below the sparse last points");
+    /// The threshold of a mounting that never pulls is at most this many times its highest pressure.
+    THRESHOLD_BEYOND: f64 = 1.2, "p_th/p_max", "1", Judgement;
     /// Pressure from which the bladder carries its part.
     ENGAGED: f64 = 60.0, "P_e", "kPa", Measured("on the 29 cm muscle the squared residual is 3377 N² with it, 4396 N² with P_b in its place");
     /// Least pressure over which the bladder's carried part builds up.
@@ -33,6 +37,8 @@ pam_data::criteria! {
     BALANCE_START: f64 = 115.0, "P_b0", "kPa", Measured("best common value of eleven muscles");
     /// Largest stress-free pressure.
     BALANCE_MOST: f64 = 200.0, "P_b,max", "kPa", Measured("above it no muscle of the kind begins to pull");
+    /// Where the stress-free pressure is identifiable, it starts at the threshold of the longest mounting within these shares of its usual start.
+    BALANCE_FIRST: ((f64, f64)) = (0.5, 1.3), "r_P_b0", "1", Judgement;
     /// The search for the stress-free pressure ends at smaller steps.
     BALANCE_MOVES: f64 = 0.2, "ΔP_b", "kPa", Derived("a tenth of its usual standard error");
     /// P_b is identifiable when a mounting pulls from less than this times P_b.
@@ -51,6 +57,8 @@ pam_data::criteria! {
     SUPPORT: f64 = 10.0, "ΔP_s", "kPa", Derived("half a pulse");
     /// Least relaxed share that is named (2 % a decade).
     MEMORY_LEAST_SHARE: f64 = 0.1, "c_min", "1", Measured("largest of 144 nulls 0.040; below what filled rubbers relax");
+    /// First runs differ from all later ones by chance in one of as many ways as there are to choose them: at least this many.
+    FIRST_RUN_WAYS: f64 = 20.0, "1/p_first", "1", Convention("p = 5 %");
     /// Least share of the squared unseen error that the memory must remove.
     LEAST_GAIN: f64 = 0.15, "g_min", "1", Measured("largest of 60 nulls with ten runs 0.10");
     /// Least number of runs of a mounting in which a lasting slip is looked for.
@@ -95,6 +103,14 @@ pam_data::criteria! {
     LEAST_AREA: f64 = 0.3, "a_min", "1", Derived("a braid's area at two thirds of its largest contraction, strands 29° from the axis");
     /// The memory is the cause of the gap between filling and emptying if it takes at least this share of it.
     GAP_EXPLAINED: f64 = 0.5, "g_gap", "1", Derived("most of it");
+    /// The pressure stays at its top within this share of the highest: the plateau on which creep is read.
+    PLATEAU_WITHIN: f64 = 0.006, "ΔP_top/P_max", "1", Judgement;
+    /// Rows of such a plateau, at least.
+    PLATEAU_ROWS: usize = 6, "n_top", "1", Derived("three coefficients and as many degrees of freedom");
+    /// The clock of creep on a plateau begins this long before its first row: the last pulses led up to it.
+    PLATEAU_FROM: f64 = 2.0, "t_top", "s", Judgement;
+    /// Creep on a plateau is read where the pressure leaves this share of the variance of log time free.
+    PLATEAU_FREE: f64 = 0.05, "q_free", "1", Judgement;
     /// A settled point pulls above this share of the largest force.
     PULLS: f64 = 0.0125, "f_p", "1", Derived("5 N of 400 N, above the offset of a load cell between sessions");
     /// Contrasts interpolate between points at most this many knots apart.
@@ -168,6 +184,8 @@ pam_data::criteria! {
     TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
     /// Nodes of a table of held lengths over the pressures that pull.
     HELD_NODES: usize = 10, "n_node", "1", Derived("a knee of 60 kPa among 600 kPa; the penalties decide, not their number");
+    /// The highest pressure that may be commanded has a node where it is this many node distances above those recorded, at most this many above them.
+    HELD_LAST_NODE: ((f64, f64)) = (0.3, 2.0), "d_node", "1", Judgement;
     /// Most elastic coefficients of it.
     HELD_ORDER: (usize) = 4, "M", "1", Derived("the base model's order");
     /// Weights of second differences of its curves that are tried, per point.
@@ -178,6 +196,10 @@ pam_data::criteria! {
     HELD_FOLDS: usize = 12, "n_fold", "1", Cost;
     /// Standard deviation of the area's scale: 5 % of the diameter.
     HELD_GAMMA_ERROR: f64 = 0.1, "s_gamma", "1", Derived("as the prior of the diameter in a fit");
+    /// Prior mean of the deadband, as a share of the highest pressure.
+    HELD_DEADBAND: f64 = 0.1, "P_0/P_max", "1", Judgement;
+    /// Its prior deviation.
+    HELD_DEADBAND_ERROR: f64 = 1.0, "s_P_0/P_max", "1", Derived("the whole range: it binds nothing");
     /// Standard deviation of the part that each elastic coefficient after the first gives, as a share of that of the one before.
     HELD_NEXT_COEFFICIENT: f64 = 0.2, "r_E", "1", Derived("a wall whose stress is nearly proportional to strain; decides only where lengths are missing");
     /// Residual that weighs the priors, as a share of the largest force.

@@ -36,6 +36,12 @@ pam_data::criteria! {
     GRID: usize = 101, "grid", "1", Cost;
     /// AFTER may reach this share of the range beyond BEFORE's pressures; the rest is not comparable.
     BEYOND: f64 = 0.05, "beyond", "1", Judgement;
+    /// A steep slope over the pressure is this quantile of all slopes of the reference.
+    USUAL_SLOPE_QUANTILE: f64 = 0.95, "q_S", "1", Judgement;
+    /// The usual slope is the median of those above this share of the steep one: where the actuator pulls.
+    USUAL_SLOPE_SHARE: f64 = 0.3, "S_pull/S_q", "1", Judgement;
+    /// An end slope of a monotone cubic is at most this many times the secant beside it.
+    MONOTONE_END: f64 = 3.0, "r_end", "1", Published("F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238-246, doi 10.1137/0717021");
     /// Residual cells per direction.
     CELLS: (usize) = 6, "cells", "1", Judgement;
     /// Strokes nearer than this are one mounting (tape measure).
@@ -58,6 +64,10 @@ pam_data::criteria! {
     LAGS_FIRST: usize = 13, "lags_first", "1", Cost;
     /// A row further than this many median intervals from the one before says nothing about lags.
     LAG_GAP: f64 = 3.0, "lag_gap", "1", Judgement;
+    /// The highest correlation of neighbouring residuals that is used for the variance of a lag.
+    LAG_CORRELATION: f64 = 0.99, "ρ_τ", "1", Derived("an effective number of rows of at least a two-hundredth");
+    /// A run weighs in the lag score by what a lag of this size would change in its force.
+    LAG_WEIGHED_BY: f64 = 0.05, "τ_w", "s", Judgement;
     /// Multiple of the longest lag tried first. Beside a change of friction, rows within that time after a reversal say nothing about lags:
     /// e⁻³ of a jump is left.
     LAG_AFTER_TURN: f64 = 3.0, "lag_after_turn", "1", Derived("e^-3 = 5 %");
@@ -67,8 +77,14 @@ pam_data::criteria! {
     LAG_FLOOR: f64 = 0.010, "lag_floor", "s", Judgement;
     /// Runs that `LAG_FLOOR` is worth.
     LAG_RUNS: f64 = 4.0, "lag_runs", "1", Judgement;
+    /// Lags of runs further than this many robust deviations from their mounting's are clipped there: they are few, and outliers among them widen the spread.
+    LAG_SPREADS: f64 = 3.0, "c_τ", "1", Convention("three standard deviations");
     /// The sizes of lags that are equally likely beforehand.
     LAG_SIZES: ([f64; 5]) = [0.02, 0.05, 0.1, 0.2, 0.4], "lag_sizes", "s", Judgement;
+    /// The size of a lag is known from the rows in motion; the settled cells may put it right by this share of it.
+    LAG_CORRECTED: f64 = 0.3, "r_τ", "1", Judgement;
+    /// Settled cells that contradict a lag change its log evidence by no less than this: its trace in them is uncertain.
+    LAG_CONTRADICTED: f64 = -5.0, "ln B_τ,min", "1", Derived("odds of 150 to 1 against the lag");
     /// Loss of closed valves: time since the last fast move of the pressure from which on its slope counts.
     LOSS_AFTER: f64 = 0.1, "loss_after", "s", Judgement;
     /// The shortest rest whose slope counts.
@@ -99,6 +115,10 @@ pam_data::criteria! {
     LOSS_SIZES: ([f64; 4]) = [5e-4, 2e-3, 8e-3, 3.2e-2], "loss_sizes", "1/s", Measured("leak-downs of fluidic muscles, 3e-4 to 1.5e-2");
     /// Variance of a median over that of a mean.
     MEDIAN_VARIANCE: f64 = 1.57, "median_variance", "1", Derived("pi/2");
+    /// Own error of a cell where the actuator is slack, as a share of that where it pulls.
+    CELL_SLACK: f64 = 0.2, "a_0", "1", Judgement;
+    /// The mean of this many rows has twice the variance of a cell of many rows.
+    CELL_ROWS: f64 = 2.0, "n_a", "1", Judgement;
     /// The values for fluidic muscles; for another actuator they are a prior, and the common scale adapts.
     REPEATS: (Repeats) = Repeats {
         creep: 0.386,
@@ -128,6 +148,8 @@ pam_data::criteria! {
     PRIOR_NONE: f64 = 0.80, "prior_none", "1", Judgement;
     /// Prior probability of a change without a name.
     PRIOR_UNKNOWN: f64 = 0.05, "prior_unknown", "1", Judgement;
+    /// Least and largest prior probability of no change that a user can state.
+    PRIOR_LIMITS: ((f64, f64)) = (0.01, 0.99), "p_none,lim", "1", Convention("no statement of a user makes a change impossible or certain");
     /// Bayes factor that must be left when any one mounting is set aside: "strong evidence" (Kass and Raftery 1995).
     GATE: f64 = 20.0, "gate", "1", Published("Kass and Raftery 1995");
     /// Mountings from which on the gate can ask.
@@ -138,6 +160,10 @@ pam_data::criteria! {
     POSSIBLE: f64 = 0.05, "possible", "1", Convention("1 - 95 %");
     /// The set of names holds so much probability.
     SET: f64 = 0.95, "set", "1", Convention("95 %");
+    /// A change is detectable from the size on that is named with the power of this normal quantile.
+    DETECTABLE_POWER: f64 = 1.28, "z_β", "1", Convention("normal quantile of a power of 90 %");
+    /// Log evidence by which a name must lead beyond its prior odds to be called detectable.
+    DETECTABLE_LEAD: f64 = 3.0, "ln B_det", "1", Convention("e^3 = 20, strong evidence as for GATE");
     /// Error of the slopes ∂F/∂P and ∂F/∂x, share of the size: by principle, they are estimated from the same recordings.
     SLOPE_ERROR: f64 = 0.05, "slope_error", "1", Judgement;
     /// Error of the whole shape of a change that is named already, share of its size: what it leaves is no evidence of another one.
@@ -159,6 +185,8 @@ pam_data::criteria! {
     COURSE_PART: ((f64, f64)) = (0.03, 0.97), "course_part", "1", Judgement;
     /// Log evidence by which one profile over time must lead the other to be reported: e³ = 20.
     COURSE_LEAD: f64 = 3.0, "course_lead", "1", Convention("e^3 = 20");
+    /// The stretch of likely starts of a change holds this probability.
+    COURSE_INTERVAL: f64 = 0.95, "p_start", "1", Convention("95 %");
     /// Pairs of changes that are weighed in full where one name leaves something, the likeliest first.
     PAIRS_TRIED: usize = 3, "pairs_tried", "1", Cost;
     /// Names in one answer, at most.
@@ -167,6 +195,19 @@ pam_data::criteria! {
     OTHER_ACTUATOR: f64 = 0.25, "other_actuator", "1", Judgement;
     /// Force ratios within this range do not raise the suspicion.
     FORCE_RATIO: ((f64, f64)) = (0.7, 1.4), "force_ratio", "1", Judgement;
+    /// Force ratios are judged where the largest pressures of both sides differ by less than this share.
+    SAME_PRESSURES: f64 = 0.1, "dP_max/P_max", "1", Judgement;
+    /// Factors between units that are often confused, with their names.
+    UNIT_FACTORS: ([(f64, &str); 8]) = [
+        (1e3, "a thousand (such as N and kN, Pa and kPa)"),
+        (1e6, "a million (such as Pa and MPa)"),
+        (1e2, "a hundred (such as kPa and bar)"),
+        (1e5, "a hundred thousand (such as Pa and bar)"),
+        (4.448_222, "4.448 (N and lbf)"),
+        (9.806_65, "9.807 (N and kgf)"),
+        (6.894_757, "6.895 (kPa and psi)"),
+        (14.503_8, "14.50 (bar and psi)"),
+    ], "f_unit", "1", Derived("definitions of the units");
     /// How near a ratio must be to a factor between units to be taken for one.
     UNIT_NEAR: f64 = 0.05, "unit_near", "1", Judgement;
     /// A column smaller than what a table gives by this factor is in another unit, where the factor is one between units.
@@ -198,6 +239,8 @@ pam_data::criteria! {
     STROKE_ENDS: f64 = 0.15, "stroke_ends", "1", Judgement;
     /// Rows slower than this share of the 70th percentile of speed are left out: turns and holds.
     STROKE_SPEED: f64 = 0.3, "stroke_speed", "1", Judgement;
+    /// ... the quantile of the speed that this share is taken of: most rows move.
+    STROKE_SPEED_QUANTILE: f64 = 0.7, "q_v", "1", Judgement;
     /// Neighbouring mean pressures that differ by less than this share of the largest are one level.
     LEVEL: f64 = 0.04, "level", "1", Judgement;
     /// A recording whose stroke stays within this is held.
@@ -220,6 +263,10 @@ pam_data::criteria! {
     STROKE_LENGTH: f64 = 0.3, "stroke_length", "1", Judgement;
     /// Prior probability of no change for strokes, where nothing of the spread between campaigns is learned.
     STROKE_PRIOR_NONE: f64 = 0.5, "stroke_prior_none", "1", Judgement;
+    /// Strokes without a name are unexplained where the probability of no change is below this.
+    STROKE_UNEXPLAINED: f64 = 0.1, "p_none,x,min", "1", Convention("odds of 9 to 1 for some change");
+    /// Sets of changes of strokes that are weighed against each other: 0 zero and 1 gain of the force, 2 friction, 3 friction that grows with pressure.
+    STROKE_SETS: ([&[usize]; 9]) = [&[], &[0], &[1], &[2], &[3], &[2, 3], &[1, 2], &[1, 3], &[1, 2, 3]], "S", "1", Judgement;
     /// Log evidence that lies this much below none needs no gate.
     GATE_WORTH_ASKING: f64 = -1.0, "gate_worth_asking", "1", Judgement;
     /// A part of the cells is reported where it holds this much more of the energy than of the cells.
@@ -228,6 +275,8 @@ pam_data::criteria! {
     REPEATABILITY_PULLS: f64 = 0.05, "repeatability_pulls", "1", Judgement;
     /// Share of the largest pressure within which a regulated one stays.
     REPORT_REGULATED: f64 = 0.3, "report_regulated", "1", Judgement;
+    /// ... between these quantiles of it: single strokes may begin and end elsewhere.
+    REGULATED_QUANTILES: ((f64, f64)) = (0.1, 0.9), "q_reg", "1", Judgement;
     /// Coefficients of one curve.
     SPLINE_COEFFICIENTS: (usize) = SPLINE_INTERVALS + 3, "spline_coefficients", "1", Derived("cubic splines");
     /// Numerical floor of the diagonal, share of the largest force.
@@ -267,6 +316,8 @@ pam_data::criteria! {
     CATALOGUE_FLOOR: f64 = 2e-4, "catalogue_floor", "1", Convention("load cell, 0.02 %");
     /// Cells that the spread of all kinds of motion is worth for that of one kind.
     CATALOGUE_PRIOR: f64 = 10.0, "catalogue_prior", "1", Judgement;
+    /// Differences of cells from the mean of their state are clipped at this many robust deviations before their variance is taken: single cells, as after a restart, must not decide it, and fewer than one in ten thousand normal ones are touched.
+    CATALOGUE_CLIP: f64 = 4.0, "c_c", "1", Judgement;
     /// The shortest rest, s; longer ones count by decades.
     CATALOGUE_REST: f64 = 1.0, "catalogue_rest", "s", Judgement;
     /// In a rest friction has slipped where the force has moved by more than this share of friction that neither the strokes beside it nor the
@@ -276,8 +327,12 @@ pam_data::criteria! {
     CATALOGUE_SLIP_SPREADS: f64 = 5.0, "catalogue_slip_spreads", "1", Judgement;
     /// Speeds that differ by less than about this factor count as one.
     CATALOGUE_SPEED_STEP: f64 = 4.0, "catalogue_speed_step", "1", Judgement;
+    /// Slower rows count as this share of the usual speed.
+    CATALOGUE_SLOWEST: f64 = 1e-3, "v_min/v", "1", Judgement;
     /// What campaigns usually differ by without a change, share of the largest force: a load cell's zero, gain, gauge and friction.
     CATALOGUE_USUAL: f64 = 5e-4, "catalogue_usual", "1", Judgement;
+    /// A change that is named already may have any size: prior deviation, in largest forces.
+    CATALOGUE_TAKEN: f64 = 30.0, "u_named/F_max", "1", Derived("thirty largest forces bind nothing");
     /// How inexact the law of an effect may be, share of its trace in each state, each as likely as the others beforehand: from a law that is
     /// nearly exact to one that is good to a fifth. A difference that no law describes better has no name.
     CATALOGUE_LAW_ERRORS: ([f64; 3]) = [0.05, 0.1, 0.2], "catalogue_law_errors", "1", Judgement;
@@ -291,6 +346,12 @@ pam_data::criteria! {
     CATALOGUE_INDEPENDENT: f64 = 24.0, "catalogue_independent", "1", Judgement;
     /// Steps of the refinement of shapes.
     CATALOGUE_REFINED: usize = 6, "catalogue_refined", "1", Cost;
+    /// First step of that refinement, as a part of the range of a shape.
+    CATALOGUE_STEP: f64 = 0.06, "du_1", "1", Judgement;
+    /// An effect of this probability is listed beside the one that is named.
+    CATALOGUE_COMPETITOR: f64 = 0.02, "p_comp", "1", Judgement;
+    /// All names together have at least this prior probability.
+    CATALOGUE_LEAST_PRIOR: f64 = 1e-3, "p_names,min", "1", Judgement;
     /// Length and pressure move together: parts of the stroke, each of which counts as a held length.
     COMBINED_LENGTHS: usize = 5, "combined_lengths", "1", Judgement;
     /// The same: spans of time, whose differences show how far the actuator repeats.
@@ -299,6 +360,8 @@ pam_data::criteria! {
     COMBINED_FEWEST_ROWS: usize = 10, "combined_fewest_rows", "1", Judgement;
     /// Ridge on the coefficients of the force over pressure and stroke, share of the rows.
     COMBINED_RIDGE: f64 = 1e-6, "combined_ridge", "1", Judgement;
+    /// The force over pressure and stroke is held constant this far beyond their ranges, in half-ranges.
+    COMBINED_BEYOND: f64 = 1.1, "u_max", "1", Judgement;
     /// Error of the shapes where length and pressure move together, share of their size: slopes are those of five coarse parts.
     COMBINED_SHAPE_ERROR: f64 = 0.2, "combined_shape_error", "1", Judgement;
     /// A table is compared where it gives more than this share of its largest force: it is fitted where the muscle pulls.

@@ -26,6 +26,8 @@ pam_data::criteria! {
     RECORDING_FOLDS: u32 = 10, "n_rec", "1", Convention("ten-fold cross-validation");
     /// Recordings of held length from which they are left out by recordings.
     FEWEST_RECORDINGS: usize = 4, "n_rec,min", "1", Judgement;
+    /// Recordings at one pressure are left out one by one where they are this few and this many.
+    RECORDINGS_HELD_OUT: ((usize, usize)) = (2, 10), "n_rec,lim", "1", Derived("one is left to learn from; more than ten are many refits");
     /// Pressure levels from which a pressure can be left out.
     FEWEST_LEVELS_HELD_OUT: usize = 3, "n_P,min", "1", Derived("two others span a range to interpolate in");
     /// Held lengths from which a length can be left out; it is predicted where others lie on both sides.

@@ -5,7 +5,7 @@
 //! curve would be lost. Bands of four and a border of `J` columns: `O(rows (4 + J)²)`.
 
 use super::campaign::Points;
-use super::criteria::{DAMPING, RIDGE, SHIFT_FIT_PRIOR, SMOOTHNESS, SMOOTHNESS_STATIC};
+use super::criteria::{DAMPING, KNOTS, RIDGE, SHIFT_FIT_PRIOR, SMOOTHNESS, SMOOTHNESS_STATIC};
 use super::spline::Banded;
 use pam_fit::numerics::bspline::CubicSplines;
 
@@ -16,9 +16,9 @@ pub(super) struct ShiftFit {
     pub curves: Vec<Vec<f64>>,
 }
 
-/// The splines of a campaign: knots every 1, 2 or 5 × 10ⁿ kPa, about thirteen below the highest pressure.
+/// The splines of a campaign: knots every 1, 2 or 5 × 10ⁿ kPa, about `KNOTS` below the highest pressure.
 pub(super) fn knot_step(highest: f64) -> f64 {
-    let aimed = highest.max(1e-3) / 13.0;
+    let aimed = highest.max(1e-3) / KNOTS;
     let decade = 10.0_f64.powf(aimed.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade);
     let nearer = |a: &f64, b: &f64| (a / aimed).ln().abs().total_cmp(&(b / aimed).ln().abs());

@@ -18,6 +18,7 @@ use super::criteria::{
     LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_REWEIGHTED, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST,
     LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
 };
+use super::detectable;
 use super::motion;
 use super::runs::{Run, Runs};
 use super::shapes::{CHANGES, Change};
@@ -197,13 +198,11 @@ pub(super) fn add(report: &mut ChangeReport, loss: &Loss, none: f64) {
     report.probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let named = probability >= NAMED;
     if !named {
-        // The odds that the prior requires of the evidence; 1.28: with 90 %.
-        let z = (2.0 * (1.0 / prior).ln() + 6.0).sqrt();
         report.considered.push(Considered {
             effect: about.name.into(),
             gain: probability,
             why_not: WhyNot::of(true, probability),
-            detectable: Some(loss.std * (z + 1.28)),
+            detectable: Some(detectable::size(loss.std, detectable::required(1.0 / prior, 0.0))),
             unit: "1/s".into(),
         });
         return;

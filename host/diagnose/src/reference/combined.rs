@@ -10,9 +10,9 @@ use pam_data::statistics::{extremes, quantile, range};
 
 use super::answer::NotComparable;
 use super::criteria::{
-    BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE, COMBINED_SMOOTH,
-    COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS, STROKES_ENDS,
-    TABLE_SURFACE_STEP, TURN,
+    BEYOND, COMBINED_BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE,
+    COMBINED_SMOOTH, COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS,
+    STROKES_ENDS, TABLE_SURFACE_STEP, TURN,
 };
 use super::motion::turning;
 use super::runs::{Mounted, Run, Runs, mounted_anew};
@@ -107,11 +107,14 @@ impl Plane {
         Ok(Self { coefficients: solved.ok_or_else(unusable)?, ..plane })
     }
 
-    /// Pressure and stroke within −1 to 1.
+    /// Pressure and stroke, −1 to 1 over the range.
     fn scaled(&self, pressure: f64, stroke: f64) -> (f64, f64) {
         let one =
             |v: f64, (low, high): (f64, f64)| 2.0 * (v - low) / (high - low).max(f64::MIN_POSITIVE) - 1.0;
-        (one(pressure, self.pressures).clamp(-1.1, 1.1), one(stroke, self.strokes).clamp(-1.1, 1.1))
+        (
+            one(pressure, self.pressures).clamp(-COMBINED_BEYOND, COMBINED_BEYOND),
+            one(stroke, self.strokes).clamp(-COMBINED_BEYOND, COMBINED_BEYOND),
+        )
     }
 
     fn terms(&self, pressure: f64, stroke: f64, direction: f64) -> DVector<f64> {

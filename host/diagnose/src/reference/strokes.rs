@@ -4,8 +4,8 @@ use pam_data::statistics::{median, quantile, range};
 use std::collections::BTreeMap;
 
 use super::criteria::{
-    LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKES_ENDS, STROKES_FEWEST_ROWS, STROKES_RUN_IN,
-    STROKES_SPEED_OVER, TURN,
+    LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKE_SPEED_QUANTILE, STROKES_ENDS, STROKES_FEWEST_ROWS,
+    STROKES_RUN_IN, STROKES_SPEED_OVER, TURN,
 };
 use super::motion::turning;
 use super::surface::bin;
@@ -114,7 +114,7 @@ fn parts(
 ) -> Vec<(f64, Part)> {
     let speed = speed(&recording.time, &recording.stroke);
     let mut speeds: Vec<f64> = speed.iter().map(|v| v.abs()).collect();
-    let fast = STROKE_SPEED * quantile(&mut speeds, 0.7);
+    let fast = STROKE_SPEED * quantile(&mut speeds, STROKE_SPEED_QUANTILE);
     let margin = STROKE_ENDS * (high - low);
     let mut all = Vec::new();
     for (rows, level, direction) in strokes(recording) {

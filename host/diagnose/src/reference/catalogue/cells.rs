@@ -7,8 +7,8 @@ use model_core::braid::Braid;
 use nalgebra::DVector;
 
 use super::super::criteria::{
-    CATALOGUE_BINS, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
-    CATALOGUE_SPEED_STEP,
+    CATALOGUE_BINS, CATALOGUE_CLIP, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
+    CATALOGUE_SLOWEST, CATALOGUE_SPEED_STEP,
 };
 use super::rests;
 use crate::baselines::{self, Kind};
@@ -109,7 +109,7 @@ impl States {
             // Rests by decade of their duration.
             REST + (rows.still[i] / CATALOGUE_REST).max(1.0).log10().floor() as i32
         } else {
-            let ratio = (context.speed.abs() / self.speed).max(1e-3);
+            let ratio = (context.speed.abs() / self.speed).max(CATALOGUE_SLOWEST);
             (ratio.ln() / CATALOGUE_SPEED_STEP.ln()).round() as i32
         };
         (level, rows.sign[i] > 0.0, bin, kind)
@@ -144,7 +144,8 @@ struct Level {
 fn robust(deviations: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
     let usual = deviation_from_median(median(&mut sizes));
-    let square: f64 = deviations.iter().map(|d| d.clamp(-4.0 * usual, 4.0 * usual).powi(2)).sum();
+    let square: f64 =
+        deviations.iter().map(|d| d.clamp(-CATALOGUE_CLIP * usual, CATALOGUE_CLIP * usual).powi(2)).sum();
     square / deviations.len().max(1) as f64
 }
 
