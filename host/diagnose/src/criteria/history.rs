@@ -124,52 +124,52 @@ pam_data::criteria! {
     /// Times for which the muscle may have been loaded before the first run; longer ones trade against the relaxed share.
     LOADED: ([f64; 3]) = [0.0, 100.0, 1e3], "T_0", "s", Judgement;
     /// A single time constant is refuted when its unseen error (rms) is larger by this factor: a tenth of the squared error.
-    ENTER_REFUTES: f64 = 1.054, "enter_refutes", "1", Judgement;
+    ENTER_REFUTES: f64 = 1.054, "e_1/e_τ", "1", Judgement;
     /// Probability of the name then, and where a single time constant fits as well. Both are judgements, not calibrated on known truths.
-    ENTER_SURE: f64 = 0.9, "enter_sure", "1", Judgement;
+    ENTER_SURE: f64 = 0.9, "p_sure", "1", Judgement;
     /// Probability of a name that the unseen runs support and another name shares.
-    ENTER_UNSURE: f64 = 0.5, "enter_unsure", "1", Judgement;
+    ENTER_UNSURE: f64 = 0.5, "p_unsure", "1", Judgement;
     /// An unseen error below this share of the largest force is within what the sensors of such benches resolve (0.683 N of 450 N).
-    ENTER_RESOLVED: f64 = 1.5e-3, "enter_resolved", "1", Judgement;
+    ENTER_RESOLVED: f64 = 1.5e-3, "e_res/F_max", "1", Judgement;
     /// The static search's own boundaries of a verdict.
-    ENTER_EXPLAINED: f64 = 0.8, "enter_explained", "1", Judgement;
+    ENTER_EXPLAINED: f64 = 0.8, "q_expl", "1", Judgement;
     /// A muscle that had been loaded this long before the first run was not rested, s.
-    JUDGE_LOADED_LONG: f64 = 1e3, "judge_loaded_long", "s", Judgement;
+    JUDGE_LOADED_LONG: f64 = 1e3, "T_long", "s", Judgement;
     /// The pressure of the picture of force over time, as a share of the highest.
-    JUDGE_PICTURED: f64 = 0.75, "judge_pictured", "1", Judgement;
+    JUDGE_PICTURED: f64 = 0.75, "P_pic/P_max", "1", Judgement;
     /// Below this the carried part has no sign of its own, kPa.
-    LAW_NO_SIGN: f64 = 1.0, "law_no_sign", "kPa", Judgement;
-    /// Most steps of a fit.
-    LAW_MOST_STEPS: usize = 10, "law_most_steps", "1", Judgement;
+    LAW_NO_SIGN: f64 = 1.0, "Δp_0", "kPa", Judgement;
+    /// Steps of a fit of the law with memory, at most.
+    LAW_MOST_STEPS: usize = 10, "n_GN", "1", Judgement;
     /// Below this relaxed share the stress-free pressure is not identifiable.
-    LAW_TELLS_BALANCE: f64 = 0.05, "law_tells_balance", "1", Judgement;
+    LAW_TELLS_BALANCE: f64 = 0.05, "c_b", "1", Judgement;
     /// Step of the numeric derivative in the stress-free pressure, kPa.
-    LAW_NUDGE: f64 = 1.0, "law_nudge", "kPa", Judgement;
+    LAW_NUDGE: f64 = 1.0, "h_b", "kPa", Judgement;
     /// Longest step of the stress-free pressure, kPa.
-    LAW_BALANCE_STEP: f64 = 30.0, "law_balance_step", "kPa", Judgement;
+    LAW_BALANCE_STEP: f64 = 30.0, "ΔP_b,max", "kPa", Judgement;
     /// The relaxed share has settled when it changes by less.
-    LAW_SETTLED_SHARE: f64 = 5e-4, "law_settled_share", "1", Judgement;
+    LAW_SETTLED_SHARE: f64 = 5e-4, "δc", "1", Judgement;
     /// Shuffles; the least p is one over this.
-    PLACES_SHUFFLES: usize = 499, "places_shuffles", "1", Judgement;
+    PLACES_SHUFFLES: usize = 499, "n_shuffle", "1", Judgement;
     /// A place is reported when it holds at least this much more of the error than of the points.
-    PLACES_CONCENTRATED: f64 = 1.5, "places_concentrated", "1", Judgement;
+    PLACES_CONCENTRATED: f64 = 1.5, "r_place", "1", Judgement;
     /// And when chance gives as much no more often than this.
-    PLACES_SURE: f64 = 0.05, "places_sure", "1", Judgement;
+    PLACES_SURE: f64 = 0.05, "p_place", "1", Judgement;
     /// Slopes below this say nothing about a shift, as a share of the largest.
-    RUN_OFFSET_FLAT: f64 = 0.03, "run_offset_flat", "1", Judgement;
+    RUN_OFFSET_FLAT: f64 = 0.03, "r_flat,S", "1", Judgement;
     /// Fewest points from which an offset is taken.
-    RUN_OFFSET_LEAST: usize = 5, "run_offset_least", "1", Judgement;
+    RUN_OFFSET_LEAST: usize = 5, "n_o", "1", Judgement;
     /// Weak prior that keeps a coefficient finite which no row determines.
-    SHIFT_FIT_PRIOR: f64 = 1e-8, "shift_fit_prior", "1", Judgement;
+    SHIFT_FIT_PRIOR: f64 = 1e-8, "λ_θ", "1", Judgement;
     /// Averages over this time where no pulses are found, s: longer than the ring of a pulse.
-    STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "staircase_without_pulses", "s", Judgement;
+    STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "t_avg", "s", Judgement;
     /// The pressure has turned when it has gone back by this share of the run's range: above a regulator's ripple.
-    STAIRCASE_TURN: f64 = 0.04, "staircase_turn", "1", Judgement;
+    STAIRCASE_TURN: f64 = 0.04, "δ_turn", "1", Judgement;
     /// Widths of the contact that are tried in a table.
     TABLE_WIDTHS: ([f64; 3]) = [6e4, 9e4, 1.2e5], "P_c", "Pa", Derived("from the width of the knee at full length to the pressure at which a bladder carries no stress");
     /// Times for which the muscle may have been loaded before a mounting that follows another, half a decade apart: one branch of the memory
     /// tells no finer.
-    TABLE_LOADED: ([f64; 4]) = [3e1, 1e2, 3e2, 1e3], "T_0", "s", Judgement;
+    TABLE_LOADED: ([f64; 4]) = [3e1, 1e2, 3e2, 1e3], "T_m", "s", Judgement;
     /// Such a load was not recorded: it is assumed only if it removes this share of the squared error of left-out runs.
     TABLE_LOADED_GAIN: f64 = 0.25, "g_0", "1", Judgement;
     /// Least deadband of a table beside the contact: pretension of a mounted muscle pulls before any pressure.
@@ -198,7 +198,7 @@ pam_data::criteria! {
     HELD_GAMMA_ERROR: f64 = 0.1, "s_gamma", "1", Derived("as the prior of the diameter in a fit");
     /// Prior mean of the deadband, as a share of the highest pressure.
     HELD_DEADBAND: f64 = 0.1, "P_0/P_max", "1", Judgement;
-    /// Its prior deviation.
+    /// Prior deviation of the deadband, as a share of the highest pressure.
     HELD_DEADBAND_ERROR: f64 = 1.0, "s_P_0/P_max", "1", Derived("the whole range: it binds nothing");
     /// Standard deviation of the part that each elastic coefficient after the first gives, as a share of that of the one before.
     HELD_NEXT_COEFFICIENT: f64 = 0.2, "r_E", "1", Derived("a wall whose stress is nearly proportional to strain; decides only where lengths are missing");
@@ -211,7 +211,7 @@ pam_data::criteria! {
     /// Lengths that such a search tries over this range, to both sides.
     LENGTH_STEPS: usize = 17, "n_L", "1", Cost;
     /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
-    TABLE_FOLDS: usize = 12, "n_fold", "1", Cost;
+    TABLE_FOLDS: usize = 12, "n_fold,T", "1", Cost;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;
 }

@@ -40,17 +40,17 @@ pam_data::criteria! {
     MENU_PART: f64 = 0.9, "x_max/x_free", "1", Judgement;
     /// Speeds of the recording at several speeds as multiples of the slow one, and loops at each.
     MENU_SPEEDS: ([(f64, u32); 4]) = [(0.3, 1), (1.0, 2), (4.0, 2), (16.0, 2)], "v/v_slow", "1", Judgement;
-    /// Speed between holds.
+    /// Speed between the holds, as a multiple of the slow one.
     MENU_DWELL_SPEED: f64 = 2.0, "v_dwell/v_slow", "1", Judgement;
     /// Durations of the holds, one a decade.
     MENU_DWELLS: ([f64; 3]) = [1.0, 10.0, 100.0], "t_hold", "s", Judgement;
-    /// Place of the holds.
+    /// Place of the holds, as a part of the free stroke.
     MENU_DWELL_AT: f64 = 0.5, "x_hold/x_free", "1", Judgement;
     /// Places at which the stroke turns between holds, so that they are reached from both sides.
     MENU_DWELL_TURNS: ([f64; 2]) = [0.9, 0.1], "x_turn/x_free", "1", Judgement;
     /// Places at which nested loops turn.
     MENU_NESTED: ([f64; 8]) = [0.9, 0.25, 0.75, 0.4, 0.6, 0.25, 0.9, 0.0], "x_nest/x_free", "1", Judgement;
-    /// Speeds of nested loops.
+    /// Speeds of nested loops, as multiples of the slow one.
     MENU_NESTED_SPEEDS: ([f64; 2]) = [1.0, 8.0], "v_nest/v_slow", "1", Judgement;
     /// Time over which a ramp would reach its pressure from zero.
     MENU_RAMP_TIME: f64 = 20.0, "P/(dP/dt)", "s", Judgement;

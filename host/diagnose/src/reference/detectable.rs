@@ -14,7 +14,7 @@ pub(super) fn required(odds: f64, price: f64) -> f64 {
     (2.0 * odds.ln() + 2.0 * DETECTABLE_LEAD + price).max(0.0).sqrt()
 }
 
-/// Prior odds of no change against one of so many names.
+/// Prior odds of no change against a name, one of `names`.
 pub(super) fn odds(none: f64, names: usize) -> f64 {
     none / ((1.0 - none) / names.max(1) as f64).max(1e-6)
 }
@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_size_of_so_many_deviations_just_meets_the_odds() {
+    fn a_size_just_meets_the_odds() {
         let z = required(odds(0.8, 20), 1.5);
         let gain = 0.5 * z * z;
         assert!((gain - (0.8_f64 / 0.01).ln() - DETECTABLE_LEAD - 0.75).abs() < 1e-12);
