@@ -128,3 +128,53 @@ fn every_file_that_the_architecture_page_names_exists() {
         assert!(root().join(path).exists(), "{path} is not there");
     }
 }
+
+/// The sources of the host's crates without their tests, by path.
+fn production_sources() -> Vec<(PathBuf, String)> {
+    let host = root().join("host");
+    let crates = fs::read_dir(&host).expect("the crates").flatten().map(|e| e.path().join("src"));
+    let mut folders: Vec<PathBuf> = crates.chain([host.join("src")]).filter(|p| p.is_dir()).collect();
+    let mut sources = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for path in fs::read_dir(folder).expect("a folder").flatten().map(|e| e.path()) {
+            if path.is_dir() && !path.ends_with("tests") {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs") {
+                let text = fs::read_to_string(&path).expect("a source file");
+                let production = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("").to_owned();
+                sources.push((path, production));
+            }
+        }
+    }
+    sources
+}
+
+/// Medians, deviations from a median, and the normal distribution's quantiles have one home. The criteria state their own values.
+#[test]
+fn order_statistics_and_quantiles_are_computed_in_one_place() {
+    let sources = production_sources();
+    assert!(sources.len() > 300, "{}", sources.len());
+    let home = |path: &Path| {
+        path.ends_with("data/src/statistics.rs")
+            || path.components().any(|c| ["numerics", "criteria"].iter().any(|home| c.as_os_str() == *home))
+    };
+    let number = |code: &str, digits: &str| {
+        code.match_indices(digits).any(|(at, _)| {
+            let digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+            !digit(code[..at].chars().next_back()) && !digit(code[at + digits.len()..].chars().next())
+        })
+    };
+    let mut found = Vec::new();
+    for (path, text) in sources.iter().filter(|(path, _)| !home(path)) {
+        for line in text.lines() {
+            let code = line.split("//").next().unwrap_or("").split('"').next().unwrap_or("");
+            let median = code.contains("len() / 2]") || code.contains("len() / 2;");
+            let literal =
+                ["1.4826", "0.6745", "0.674_489", "1.96", "1.959_964"].iter().any(|d| number(code, d));
+            if median || literal {
+                found.push(format!("{}: {}", path.display(), line.trim()));
+            }
+        }
+    }
+    assert_eq!(found, [""; 0], "use pam_data::statistics");
+}

@@ -237,6 +237,7 @@ fn generated(name: &str) -> Option<String> {
                 rows.collect::<String>()
             ))
         }
+        "criteria" => Some(pam_diagnose::criteria::markdown()),
         _ => None,
     }
 }

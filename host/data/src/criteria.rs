@@ -138,13 +138,15 @@ macro_rules! criteria {
 pub fn markdown(stages: &[Stage]) -> String {
     let mut page = String::new();
     for stage in stages {
-        page.push_str(&format!("### {}\n\n", stage.title));
+        page.push_str(&format!("## {}\n\n", stage.title));
         page.push_str("| criterion | symbol | value | unit | meaning | source |\n| --- | --- | --- | --- | --- | --- |\n");
         for c in stage.criteria {
             let meaning = c.meaning.trim();
+            // The source breaks long values into lines.
+            let value = c.value.split_whitespace().collect::<Vec<_>>().join(" ");
             page.push_str(&format!(
-                "| `{}` | {} | {} | {} | {meaning} | {} |\n",
-                c.name, c.symbol, c.value, c.unit, c.source
+                "| `{}` | {} | {value} | {} | {meaning} | {} |\n",
+                c.name, c.symbol, c.unit, c.source
             ));
         }
         page.push('\n');

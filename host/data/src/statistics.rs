@@ -1,4 +1,4 @@
-//! Order statistics: extremes, the median and other quantiles, by partial sorting in linear time.
+//! Order statistics: extremes, the median and other quantiles, by partial sorting in linear time; and the normal distribution's constants.
 //!
 //! Values that are not numbers sort to the ends ([`f64::total_cmp`]), so a few of them do not move a median.
 
@@ -78,6 +78,38 @@ pub fn median(values: &mut [f64]) -> f64 {
     ranked(values, values.len() / 2)
 }
 
+/// The median of integers, such as times in nanoseconds: of an even number of values the upper of the two in the middle, and 0 of no
+/// values. Reorders the values.
+///
+/// ```
+/// use pam_data::statistics::integer_median;
+/// assert_eq!(integer_median(&mut [4, 3, 1, 2]), 3);
+/// assert_eq!(integer_median(&mut []), 0);
+/// ```
+#[must_use]
+pub fn integer_median(values: &mut [u64]) -> u64 {
+    if values.is_empty() {
+        return 0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable(middle).1
+}
+
+/// The median; of an even number of values the mean of the two in the middle, which does not lean to larger values where there are few.
+/// 0 of no values. Reorders the values.
+///
+/// ```
+/// use pam_data::statistics::midpoint_median;
+/// assert_eq!(midpoint_median(&mut [3.0, 1.0, 2.0]), 2.0);
+/// assert_eq!(midpoint_median(&mut [4.0, 3.0, 1.0, 2.0]), 2.5);
+/// assert_eq!(midpoint_median(&mut []), 0.0);
+/// ```
+#[must_use]
+pub fn midpoint_median(values: &mut [f64]) -> f64 {
+    let n = values.len();
+    0.5 * (ranked(values, n.saturating_sub(1) / 2) + ranked(values, n / 2))
+}
+
 /// The value that is nearest in rank to a quantile, `share` from 0 (smallest) to 1 (largest); 0 of no values. Reorders the
 /// values.
 ///
@@ -90,6 +122,10 @@ pub fn median(values: &mut [f64]) -> f64 {
 pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     ranked(values, (values.len().saturating_sub(1) as f64 * share).round() as usize)
 }
+
+/// The 97.5 % quantile of the normal distribution, Φ⁻¹(0.975) = 1.959 964, rounded as usual: half the width of an interval of 95 % in
+/// standard deviations.
+pub const NORMAL_95: f64 = 1.96;
 
 /// Standard deviation of a normal distribution whose absolute values have this median.
 ///

@@ -10,11 +10,12 @@ use super::candidates::Candidate;
 use model_core::effects::Axis;
 
 use super::candidate_fit::{self, CandidateFit};
-use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN, NORMAL_95};
+use super::criteria::uncertainty::{CHANGE_POINT_RATIO, CHANGE_POINT_SCAN};
 use super::linear::{add_scaled, dot, energy};
 use super::rows::Rows;
 use super::selection_step::{SelectedEffect, Selection};
 use super::why::ChangePoint;
+use pam_data::statistics::NORMAL_95;
 
 /// The index of a change point among an effect's shapes, if it has one.
 pub(crate) fn place(candidate: &Candidate, fit: &CandidateFit) -> Option<usize> {

@@ -12,7 +12,7 @@ use super::criteria::rows::NO_LOAD;
 use super::criteria::uncertainty::{
     FEWEST_LENGTHS_HELD_OUT, FEWEST_LEVELS_HELD_OUT, FEWEST_RECORDINGS, FEWEST_STROKES_HELD_OUT,
     FEWEST_UNITS, FOLDS, HELD_OUT_ERRORS, HELD_OUT_LEAVES, HELD_OUT_ROWS, ONE_BLADDER, RECORDING_FOLDS,
-    SEEN_ONCE, STROKE_PARTS,
+    RECORDINGS_HELD_OUT, SEEN_ONCE, STROKE_PARTS,
 };
 use super::linear::energy;
 use super::rows::Rows;
@@ -198,7 +198,9 @@ fn strictest(rows: &Rows, kind: Kind) -> Groups {
         by_pressure
     } else if rows.blocks >= FEWEST_STROKES_HELD_OUT {
         by_stroke
-    } else if (2..=10).contains(&by_recording.groups.len()) && rows.levels.len() < 2 {
+    } else if (RECORDINGS_HELD_OUT.0..=RECORDINGS_HELD_OUT.1).contains(&by_recording.groups.len())
+        && rows.levels.len() < 2
+    {
         by_recording
     } else {
         by_time

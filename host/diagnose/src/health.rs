@@ -12,9 +12,11 @@
 use model_core::link::messages::{COLUMNS, HealthSums, LAGGED, SHAPES, SUMS, Shape, TableHealth, WATCHED};
 use nalgebra::{DMatrix, DVector};
 
-use crate::criteria::table_health::{DISTINCT_CHANGES, HEALTH_CORRELATION, SECOND_CHANGE};
-use crate::criteria::uncertainty::NORMAL_95;
+use crate::criteria::table_health::{
+    DISTINCT_CHANGES, HEALTH_CORRELATION, HEALTH_DISTINCT, HEALTH_PAIRS, HEALTH_SHOWN, SECOND_CHANGE,
+};
 use crate::reference::shapes::Change;
+use pam_data::statistics::NORMAL_95;
 
 /// What is known of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,12 +128,12 @@ impl<'a> Equations<'a> {
         let normal = DMatrix::from_fn(count, count, |r, c| self.matrix[(shapes[r], shapes[c])]);
         // Scaled to a unit diagonal, so that shapes of different size are compared.
         let scale: Vec<f64> = (0..count).map(|at| normal[(at, at)].sqrt()).collect();
-        if scale.iter().any(|s| !(*s > 1e-6 * self.weight.sqrt())) {
+        if scale.iter().any(|s| !(*s > HEALTH_SHOWN * self.weight.sqrt())) {
             return None;
         }
         let unit = DMatrix::from_fn(count, count, |r, c| normal[(r, c)] / (scale[r] * scale[c]));
         // Shapes that differ by less than single precision resolves cannot be fitted together.
-        if unit.clone().symmetric_eigen().eigenvalues.min() < 1e-5 {
+        if unit.clone().symmetric_eigen().eigenvalues.min() < HEALTH_DISTINCT {
             return None;
         }
         let inverse = unit.cholesky()?.inverse();
@@ -151,7 +153,7 @@ impl<'a> Equations<'a> {
         }
         let at = |place: usize| f64::from(self.sums.lagged[place]);
         let pairs = at(LAGGED - 1);
-        if !(pairs >= 0.25 * self.weight) {
+        if !(pairs >= HEALTH_PAIRS * self.weight) {
             return None;
         }
         let (own, cross) = (at(3 * shape), at(3 * shape + 1) + at(3 * shape + 2));

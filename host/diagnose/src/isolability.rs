@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::baselines::cosine;
 use super::criteria::baseline::TABLE_ORDER;
-use super::criteria::candidates::INVISIBLE;
+use super::criteria::candidates::{INVISIBLE, TYPICAL_LEAST};
 use super::criteria::planning::{INDISTINGUISHABLE, PLAN_POWERS, PROTOCOL_ROWS};
 use super::criteria::rows::VENTED_SHARE;
 use super::linear::{Basis, energy};
@@ -81,7 +81,7 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
             let parts = if law.info().alternatives { 1 } else { columns.len() };
             for (p, c) in law.amplitudes().iter().zip(&columns).take(parts) {
                 let (least, most) = if p.high > 0.0 { (p.low, p.high) } else { (p.high, p.low) };
-                let typical = (least.abs().max(most.abs() * 1e-3) * most.abs()).sqrt();
+                let typical = (least.abs().max(most.abs() * TYPICAL_LEAST) * most.abs()).sqrt();
                 for (s, i) in sum.iter_mut().zip(&keep) {
                     *s += typical * if c[*i].is_finite() { c[*i] } else { 0.0 };
                 }

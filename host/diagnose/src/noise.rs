@@ -14,7 +14,7 @@ use super::criteria::noise::{
 use super::linear::{Random, energy};
 use super::remark::Scatter;
 use super::rows::Rows;
-use pam_fit::numerics::{median, quantile};
+use pam_data::statistics::{median, quantile};
 
 /// The noise of the rows.
 #[derive(Clone, Copy, Debug)]

@@ -10,7 +10,7 @@ use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 pub use pam_protocol::{Place, Protocol, Step};
 
-use super::criteria::planning::{FREE_STROKE, PROTOCOL_SAMPLES};
+use super::criteria::planning::{FREE_STROKE, PROTOCOL_PRESSURE_RATE, PROTOCOL_RATE, PROTOCOL_SAMPLES};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
 use pam_data::recording::motion::Motion;
@@ -42,7 +42,7 @@ pub fn parse(text: &str) -> Result<Protocol> {
 /// # Errors
 /// [`DataCode::ProtocolInvalid`] for one that takes too long, or that records nothing.
 pub fn play(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Campaign> {
-    let dt = 1.0 / protocol.sample_hz.min(10.0);
+    let dt = 1.0 / protocol.sample_hz.min(PROTOCOL_RATE);
     let mut player = Player {
         muscle,
         dt,
@@ -168,7 +168,7 @@ impl Player<'_> {
             }
             Step::Pressure { to_kpa, rate_kpa_s, settle_s } => {
                 let (from, to) = (self.pressure, to_kpa * 1e3);
-                let rate = rate_kpa_s.unwrap_or(1e3).max(1e-3) * 1e3;
+                let rate = rate_kpa_s.unwrap_or(PROTOCOL_PRESSURE_RATE).max(1e-3) * 1e3;
                 let steps = ((to - from).abs() / (rate * self.dt)).ceil().max(1.0) as usize;
                 for i in 1..=steps.min(PROTOCOL_SAMPLES) {
                     self.pressure = from + (to - from) * i as f64 / steps as f64;

@@ -38,6 +38,7 @@
 //! | `units` | columns in other units, another actuator |
 //! | `sides` | rows on both sides, sides in the wrong order |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
+//! | `detectable` | the size from which on a change would be named |
 //! | [`answer`] | the answer as values |
 //! | [`correction`] | what the answer means for a table |
 //! | `updated` | the table of before with the changes of the actuator applied |
@@ -52,6 +53,7 @@ mod combined;
 mod contrast;
 pub mod correction;
 mod course;
+mod detectable;
 mod gate;
 mod held_out;
 mod interpolate;

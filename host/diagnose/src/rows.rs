@@ -25,8 +25,8 @@ use pam_data::progress::SharedProgress;
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
+use pam_data::statistics::quantile;
 use pam_fit::Clip;
-use pam_fit::numerics::quantile;
 
 /// What was recorded, row by row. Nothing changes it.
 #[derive(Clone, Debug, Default)]

@@ -12,7 +12,7 @@ use super::criteria::location::{
 use super::linear::Random;
 use super::location::shuffled;
 use super::rows::Rows;
-use pam_fit::numerics::median;
+use pam_data::statistics::median;
 
 /// A line in the spectrum of the misfit.
 #[derive(Clone, Copy, Debug)]

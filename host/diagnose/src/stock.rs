@@ -15,10 +15,10 @@ use pam_fit::numerics::student::half_width_95;
 use pam_fit::stock::{Law, LawError, Member, Place, Stock, Value, stock};
 
 use crate::criteria::stock::{EXCHANGEABLE, ONSET, ONSET_STEPS, PLACES, SLOPE_RANGE};
-use crate::criteria::uncertainty::NORMAL_95;
 use crate::history::answer::{Estimate, FindingKind};
 use crate::history::history;
 pub use mounted_lengths::{CauseError, LengthsRefusal, MountedLengths, MuscleMountings};
+use pam_data::statistics::NORMAL_95;
 
 /// An estimate with its standard error and its 95 % interval, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

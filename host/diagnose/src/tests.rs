@@ -22,7 +22,7 @@ use super::why::Why;
 use super::{Diagnosis, Options, diagnose, refitted_table};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::numerics::quantile;
+use pam_data::statistics::quantile;
 use pam_fit::predict::predict;
 use pam_fit::table_file::TableFile;
 use pam_fit::{Options as FitOptions, fit};

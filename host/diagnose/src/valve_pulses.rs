@@ -4,8 +4,8 @@
 //! lags. The quasi-static model and every effect of the library are about slower changes, so these readings are set aside.
 
 use super::criteria::valve_pulses::{
-    CONCENTRATED, LEAST_PERIODICITY, NARROW_PART, PULSE_BINS, PULSE_GRID, PULSE_PERIODS, PULSE_STEPS,
-    RING_TIME, WINDOW_FROM, WINDOW_TO,
+    CONCENTRATED, LEAST_PERIODICITY, NARROW_PART, PULSE_BEGINS, PULSE_BINS, PULSE_FINE_STEP,
+    PULSE_FINE_STEPS, PULSE_GRID, PULSE_PEAK, PULSE_PERIODS, PULSE_STEPS, RING_TIME, WINDOW_FROM, WINDOW_TO,
 };
 use pam_data::recording::Recording;
 
@@ -23,7 +23,7 @@ pub(crate) struct ValvePulses {
 /// The median distance between readings, s.
 pub(crate) fn interval(recording: &Recording) -> f64 {
     let mut steps: Vec<f64> = recording.time.windows(2).map(|w| w[1] - w[0]).collect();
-    pam_fit::numerics::median(&mut steps)
+    pam_data::statistics::median(&mut steps)
 }
 
 impl ValvePulses {
@@ -86,10 +86,10 @@ fn pulses(recording: &Recording, interval: f64) -> Option<(f64, f64, bool)> {
         return None;
     }
     // Multiples of a period correlate almost as well as the period itself.
-    let peak = |w: &[(usize, f64)]| w[1].1 >= 0.8 * best && w[1].1 >= w[0].1 && w[1].1 >= w[2].1;
+    let peak = |w: &[(usize, f64)]| w[1].1 >= PULSE_PEAK * best && w[1].1 >= w[0].1 && w[1].1 >= w[2].1;
     let lag = found.windows(3).find(|w| peak(w))?[1].0;
-    let near = |k: i32| (lag as f64 + 0.02 * f64::from(k)) * step;
-    let folds = (-50..=50).map(|k| (near(k), fold(&rate, step, near(k))));
+    let near = |k: i32| (lag as f64 + PULSE_FINE_STEP * f64::from(k)) * step;
+    let folds = (-PULSE_FINE_STEPS..=PULSE_FINE_STEPS).map(|k| (near(k), fold(&rate, step, near(k))));
     let (period, (_, phase, means)) = folds.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     Some((period, phase, is_concentrated(means.iter().map(|m| m + mean))))
 }
@@ -119,7 +119,7 @@ fn fold(rate: &[f64], step: f64, period: f64) -> (f64, f64, Vec<f64>) {
     let top = (0..bins).max_by(|a, b| means[*a].total_cmp(&means[*b])).unwrap_or(0);
     // The pulse may begin a bin before the steepest one.
     let before = (top + bins - 1) % bins;
-    let start = if means[before] > 0.3 * means[top] { before } else { top };
+    let start = if means[before] > PULSE_BEGINS * means[top] { before } else { top };
     (uneven, start as f64 / bins as f64 * period, means)
 }
 

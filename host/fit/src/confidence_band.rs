@@ -6,9 +6,6 @@ use model_core::units::{Length, Pressure};
 use crate::numerics::spline_basis::SplineBasis;
 use crate::table_file::TableFile;
 
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-pub const HALF_95: f64 = 1.96;
-
 /// The uncertainty of a table's force, prepared for evaluation at many places.
 ///
 /// ```text

@@ -9,9 +9,9 @@
 //! | [`covariance_root`] | a covariance as the product of a matrix with its transpose |
 //! | [`spline_basis`] | natural cubic splines that are 1 at one node and 0 at the others |
 //! | [`finite_difference`] | central differences |
-//! | [`median`], [`quantile`], [`ranked`] | order statistics |
+//! | [`bspline`] | cubic B-splines on even knots |
 //!
-//! statrs provides the distributions, nalgebra QR, SVD, eigenvectors and the Cholesky factorisation of small full-rank systems. [`symmetric`] is a
+//! Medians, quantiles and the normal distribution's constants are in [`pam_data::statistics`]. statrs provides the distributions, nalgebra QR, SVD, eigenvectors and the Cholesky factorisation of small full-rank systems. [`symmetric`] is a
 //! factorisation of its own because a fit has unknowns that the data do not determine: nalgebra's fails at such a pivot, this one
 //! leaves the unknown at zero and counts it.
 //!
@@ -30,6 +30,7 @@
 //! assert!((found[0] - 1.0).abs() < 1e-12 && (found[1] - 2.0).abs() < 1e-12);
 //! ```
 
+pub mod bspline;
 pub mod covariance_root;
 pub mod finite_difference;
 pub mod jackknife;
@@ -37,5 +38,3 @@ pub mod least_squares;
 pub mod spline_basis;
 pub mod student;
 pub mod symmetric;
-
-pub use pam_data::statistics::{median, quantile, ranked};

@@ -16,7 +16,7 @@ use model_core::units::{Length, Pressure};
 use rayon::prelude::*;
 
 use crate::bench::Candidate;
-use crate::confidence_band::{ConfidenceBand, HALF_95};
+use crate::confidence_band::ConfidenceBand;
 use crate::fit::points::HeldMounting;
 use crate::table_file::{Correction, StoredMounting, TableFile};
 use crate::vented_rest;
@@ -25,6 +25,7 @@ use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, Follower, HELD, Recording, has_decimal_commas};
+use pam_data::statistics::NORMAL_95;
 
 /// The predicted force of a campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,10 +87,10 @@ fn bands(band: &ConfidenceBand, recording: &Recording, motion: &Motion, force: &
     });
     let stds: Vec<f64> = stds.collect();
     let inside = recording.force.as_ref().map(|measured| {
-        let near = |i: &usize| (measured[*i] - force[*i]).abs() <= HALF_95 * band.with_scatter(stds[*i]);
+        let near = |i: &usize| (measured[*i] - force[*i]).abs() <= NORMAL_95 * band.with_scatter(stds[*i]);
         (0..measured.len()).filter(near).count() as f64 / measured.len().max(1) as f64
     });
-    let half: Vec<f64> = stds.iter().map(|s| HALF_95 * s).collect();
+    let half: Vec<f64> = stds.iter().map(|s| NORMAL_95 * s).collect();
     let mean = half.iter().sum::<f64>() / half.len().max(1) as f64;
     Bands { half, mean, inside }
 }

@@ -6,8 +6,8 @@ use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
 
-use crate::confidence_band::HALF_95;
 use crate::table_file::{FitQuality, Uncertainty};
+use pam_data::statistics::NORMAL_95;
 
 /// Values this close to zero, as a share of the highest tested pressure or of the blocked force, count as zero: an ordinary gauge or load
 /// cell is no better.
@@ -58,7 +58,7 @@ fn half_interval(uncertainty: Option<&Uncertainty>, row: usize) -> f64 {
     let Some(u) = uncertainty else { return 0.0 };
     let columns = u.columns as usize;
     let root = u.root.get(row * columns..(row + 1) * columns).unwrap_or(&[]);
-    HALF_95 * root.iter().map(|s| s * s).sum::<f64>().sqrt()
+    NORMAL_95 * root.iter().map(|s| s * s).sum::<f64>().sqrt()
 }
 
 /// A deadband below zero beyond its uncertainty. Pressure that a contact of bladder and braid takes is a part of the deadband.

@@ -4,7 +4,8 @@
 
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Recording};
-use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
+use pam_data::statistics::NORMAL_95;
+use pam_fit::confidence_band::ConfidenceBand;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, TableFile};
 use pam_fit::{Options, fit};
@@ -98,7 +99,7 @@ fn unseen_pressures_are_predicted_better_than_alone_and_the_bands_hold() {
                 let p = model_core::units::Pressure::from_pascals(r.pressure[k]);
                 let x = model_core::units::Length::from_metres(r.stroke[k]);
                 let model = built.force(p, x, v.signum()).newtons();
-                let half = HALF_95 * band.reading_std(r.pressure[k], r.stroke[k], v.signum());
+                let half = NORMAL_95 * band.reading_std(r.pressure[k], r.stroke[k], v.signum());
                 inside += f64::from(u8::from((r.force.as_ref().unwrap()[k] - model).abs() <= half));
                 rows += 1.0;
             }

@@ -7,7 +7,8 @@ use model_core::muscle::Muscle as Model;
 use model_core::units::{Force, Length, Pressure};
 use numpy::{IntoPyArray, PyArray1};
 use pam_data::physical_limits::{self, Contractions};
-use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
+use pam_fit::confidence_band::ConfidenceBand;
+use pam_data::statistics::NORMAL_95;
 use pam_fit::predict::{beyond, predict as host_predict, predict_with_bands};
 use pam_fit::table_faults::table_faults;
 use pam_fit::table_file::TableFile;
@@ -146,7 +147,7 @@ impl Table {
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(band) = ConfidenceBand::of(&self.0) else { return Ok(None) };
         let model = Model::<f64>::build(&self.0.table).map_err(|e| wrong(e.to_string()))?;
-        over(&self.0, &model, pressure, stroke, direction, |p, x, s| HALF_95 * band.std(p, x, s)).map(Some)
+        over(&self.0, &model, pressure, stroke, direction, |p, x, s| NORMAL_95 * band.std(p, x, s)).map(Some)
     }
 
     /// The force that the load cell would read, N: one array a recording. Effects and their memory run through the campaign.

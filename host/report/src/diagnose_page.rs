@@ -6,6 +6,7 @@ mod open_questions;
 
 use model_core::braid::Geometry;
 use model_core::units::Length;
+use pam_data::statistics::NORMAL_95;
 
 use super::effect_page::place;
 use super::effect_trace::Demonstration;
@@ -217,7 +218,7 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
         &["symbol", "parameter", "value", "± (95 %)", "unit", "remark"],
     );
     for p in &m.parameters {
-        let std = p.std.map_or("not identifiable".into(), |s| significant(wording::HALF_95 * s, 2));
+        let std = p.std.map_or("not identifiable".into(), |s| significant(NORMAL_95 * s, 2));
         let unit = if p.unit.is_empty() { "–".to_owned() } else { p.unit.clone() };
         // Of alternative laws those that were not chosen are zero.
         let (std, remark) = match p {

@@ -12,6 +12,7 @@ mod view;
 use super::{Page, Section, Table, Tone, fixed, significant};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
+use pam_data::statistics::NORMAL_95;
 use pam_fit::Fit;
 use pam_fit::Options;
 use view::View;
@@ -133,7 +134,7 @@ fn further_figures(view: &View<'_>) -> Table {
     table.row([
         "deadband P_{0}",
         &format!("{} kPa", fixed(s.deadband_kPa, 1)),
-        &format!("± {} kPa (95 % confidence interval)", significant(1.96 * s.deadband_std_kPa, 2)),
+        &format!("± {} kPa (95 % confidence interval)", significant(NORMAL_95 * s.deadband_std_kPa, 2)),
     ]);
     table.row(["residual", &format!("{} N", significant(s.rms_N, 2)), "rms of all fitted points"]);
     table

@@ -1,10 +1,11 @@
 //! The report of an actuator over several campaigns: one picture per quantity, its changes, and each campaign in a line.
 
 use super::wording::timeline::{
-    HALF_95, by_date, campaigns, change, headline, judged, meaning, name, point, usual_unit, warnings,
+    by_date, campaigns, change, headline, judged, meaning, name, point, usual_unit, warnings,
 };
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone};
 use pam_data::date::day;
+use pam_data::statistics::NORMAL_95;
 use pam_diagnose::timeline::course::Course;
 use pam_diagnose::timeline::series::{Kind, Series};
 use pam_diagnose::timeline::{Timeline, Visit};
@@ -100,7 +101,10 @@ fn panel(visits: &[Visit], series: &Series, course: &Course) -> Panel {
     // A campaign without repeats has a value, and no interval.
     let repeated: Vec<usize> = (0..points.len()).filter(|i| points[*i].std.is_some()).collect();
     let end = |sign: f64| -> Vec<f64> {
-        repeated.iter().map(|i| value[*i] + sign * HALF_95 * scale * points[*i].std.unwrap_or(0.0)).collect()
+        repeated
+            .iter()
+            .map(|i| value[*i] + sign * NORMAL_95 * scale * points[*i].std.unwrap_or(0.0))
+            .collect()
     };
     let interval_x: Vec<f64> = repeated.iter().map(|i| x[*i]).collect();
     let axis =

@@ -25,9 +25,6 @@ pub use value::with_interval;
 pub use why::why;
 pub use why_not::why_not;
 
-/// Half of a 95 % confidence interval in standard deviations.
-pub const HALF_95: f64 = 1.96;
-
 /// `a`, `a and b`, `a, b and c`.
 pub(crate) fn list(names: &[String]) -> String {
     match names.split_last() {

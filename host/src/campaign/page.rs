@@ -2,8 +2,8 @@
 
 use pam_campaign::campaign::Done;
 use pam_campaign::engine::Engine;
+use pam_data::statistics::NORMAL_95;
 use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
-use pam_fit::confidence_band::HALF_95;
 use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, wording};
 
 use crate::documents::campaign as document;
@@ -150,7 +150,7 @@ fn table_section(result: &document::Campaign) -> Section {
     let mut table = Table::new("The fitted table", &["quantity", "value"]);
     table.row([
         "deadband".to_owned(),
-        format!("{:.2} ± {:.2} kPa (95 %)", t.deadband_kPa, HALF_95 * t.deadband_std_kPa),
+        format!("{:.2} ± {:.2} kPa (95 %)", t.deadband_kPa, NORMAL_95 * t.deadband_std_kPa),
     ]);
     table.row(["blocked force".to_owned(), format!("{:.1} N", t.blocked_force_N)]);
     table.row(["mean error".to_owned(), format!("{:.3} % of blocked force", t.mean_error_pct)]);

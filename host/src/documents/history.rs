@@ -3,6 +3,7 @@
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
+use pam_data::statistics::NORMAL_95;
 use serde::Serialize;
 
 use pam_data::date::day;
@@ -195,7 +196,7 @@ fn quantity(series: &Series, course: &Course) -> Quantity {
 }
 
 fn change(visits: &[Visit], series: &Series, change: &course::Change) -> Change {
-    let half = wording::HALF_95 * change.std;
+    let half = NORMAL_95 * change.std;
     Change {
         quantity: wording::name(&series.what),
         how: match change.how {

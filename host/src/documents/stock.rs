@@ -3,6 +3,7 @@
 // Field names carry their unit as the JSON does: N is not n.
 #![allow(non_snake_case)]
 
+use pam_data::statistics::NORMAL_95;
 use pam_diagnose::stock::{
     CauseError, Considered, Interval, MountedLengths, MuscleMountings, MuscleOwn, SharedPlace, StockDiagnosis,
 };
@@ -228,7 +229,7 @@ fn lengths(of: &MountedLengths) -> Option<Named> {
 fn muscle(of: &MuscleOwn, mountings: Option<MuscleMountings>) -> Muscle {
     let history = |e: &pam_diagnose::history::answer::Estimate| Estimate {
         value: e.value,
-        std: e.half().unwrap_or(0.0) / 1.96,
+        std: e.half().unwrap_or(0.0) / NORMAL_95,
         low: e.low.unwrap_or(e.value),
         high: e.high.unwrap_or(e.value),
         unit: "N",

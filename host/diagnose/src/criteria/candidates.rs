@@ -26,6 +26,8 @@ pam_data::criteria! {
     SYSTEMATIC_ROWS: f64 = 100.0, "n_sys", "1", Judgement;
     /// An amplitude may exceed its known range by this factor; beyond, another cause has its name.
     AMPLITUDE_BEYOND: f64 = 10.0, "a/a_max", "1", Judgement;
+    /// The typical amplitude is the geometric mean of its range, whose low end counts as at least this share of the high one.
+    TYPICAL_LEAST: f64 = 1e-3, "a_least/a_max", "1", Judgement;
     /// Amplitudes of one law that are fitted together, at most.
     MOST_AMPLITUDES: u32 = 6, "n_a", "1", Cost;
     /// The share of a column's energy outside the base from which it is judged at all.

@@ -21,10 +21,14 @@ pam_data::criteria! {
     SMOOTHNESS_STATIC: f64 = 0.01, "λ_s", "1", Measured("chosen on six muscles; flat optimum");
     /// Weight of squared spline coefficients.
     RIDGE: f64 = 1e-6, "λ_0", "1", Derived("numerical rank only");
+    /// Knots of a curve below the highest pressure, about: their distance is 1, 2 or 5 times a power of ten.
+    KNOTS: f64 = 13.0, "n_knot", "1", Judgement;
     /// The tangent of the threshold starts at this share of the highest pressure.
     THRESHOLD_FROM: f64 = 0.84, "p_1", "1", Derived("the straight part of the pull");
     /// The tangent of the threshold ends at this share of the highest pressure.
     THRESHOLD_TO: f64 = 0.94, "p_2", "1", Derived("below the sparse last points");
+    /// The threshold of a mounting that never pulls is at most this many times its highest pressure.
+    THRESHOLD_BEYOND: f64 = 1.2, "p_th/p_max", "1", Judgement;
     /// Pressure from which the bladder carries its part.
     ENGAGED: f64 = 60.0, "P_e", "kPa", Measured("on the 29 cm muscle the squared residual is 3377 N² with it, 4396 N² with P_b in its place");
     /// Least pressure over which the bladder's carried part builds up.
@@ -33,6 +37,8 @@ pam_data::criteria! {
     BALANCE_START: f64 = 115.0, "P_b0", "kPa", Measured("best common value of eleven muscles");
     /// Largest stress-free pressure.
     BALANCE_MOST: f64 = 200.0, "P_b,max", "kPa", Measured("above it no muscle of the kind begins to pull");
+    /// Where the stress-free pressure is identifiable, it starts at the threshold of the longest mounting within these shares of its usual start.
+    BALANCE_FIRST: ((f64, f64)) = (0.5, 1.3), "r_P_b0", "1", Judgement;
     /// The search for the stress-free pressure ends at smaller steps.
     BALANCE_MOVES: f64 = 0.2, "ΔP_b", "kPa", Derived("a tenth of its usual standard error");
     /// P_b is identifiable when a mounting pulls from less than this times P_b.
@@ -51,6 +57,8 @@ pam_data::criteria! {
     SUPPORT: f64 = 10.0, "ΔP_s", "kPa", Derived("half a pulse");
     /// Least relaxed share that is named (2 % a decade).
     MEMORY_LEAST_SHARE: f64 = 0.1, "c_min", "1", Measured("largest of 144 nulls 0.040; below what filled rubbers relax");
+    /// First runs differ from all later ones by chance in one of as many ways as there are to choose them: at least this many.
+    FIRST_RUN_WAYS: f64 = 20.0, "1/p_first", "1", Convention("p = 5 %");
     /// Least share of the squared unseen error that the memory must remove.
     LEAST_GAIN: f64 = 0.15, "g_min", "1", Measured("largest of 60 nulls with ten runs 0.10");
     /// Least number of runs of a mounting in which a lasting slip is looked for.
@@ -95,6 +103,14 @@ pam_data::criteria! {
     LEAST_AREA: f64 = 0.3, "a_min", "1", Derived("a braid's area at two thirds of its largest contraction, strands 29° from the axis");
     /// The memory is the cause of the gap between filling and emptying if it takes at least this share of it.
     GAP_EXPLAINED: f64 = 0.5, "g_gap", "1", Derived("most of it");
+    /// The pressure stays at its top within this share of the highest: the plateau on which creep is read.
+    PLATEAU_WITHIN: f64 = 0.006, "ΔP_top/P_max", "1", Judgement;
+    /// Rows of such a plateau, at least.
+    PLATEAU_ROWS: usize = 6, "n_top", "1", Derived("three coefficients and as many degrees of freedom");
+    /// The clock of creep on a plateau begins this long before its first row: the last pulses led up to it.
+    PLATEAU_FROM: f64 = 2.0, "t_top", "s", Judgement;
+    /// Creep on a plateau is read where the pressure leaves this share of the variance of log time free.
+    PLATEAU_FREE: f64 = 0.05, "q_free", "1", Judgement;
     /// A settled point pulls above this share of the largest force.
     PULLS: f64 = 0.0125, "f_p", "1", Derived("5 N of 400 N, above the offset of a load cell between sessions");
     /// Contrasts interpolate between points at most this many knots apart.
@@ -108,52 +124,52 @@ pam_data::criteria! {
     /// Times for which the muscle may have been loaded before the first run; longer ones trade against the relaxed share.
     LOADED: ([f64; 3]) = [0.0, 100.0, 1e3], "T_0", "s", Judgement;
     /// A single time constant is refuted when its unseen error (rms) is larger by this factor: a tenth of the squared error.
-    ENTER_REFUTES: f64 = 1.054, "enter_refutes", "1", Judgement;
+    ENTER_REFUTES: f64 = 1.054, "e_1/e_τ", "1", Judgement;
     /// Probability of the name then, and where a single time constant fits as well. Both are judgements, not calibrated on known truths.
-    ENTER_SURE: f64 = 0.9, "enter_sure", "1", Judgement;
+    ENTER_SURE: f64 = 0.9, "p_sure", "1", Judgement;
     /// Probability of a name that the unseen runs support and another name shares.
-    ENTER_UNSURE: f64 = 0.5, "enter_unsure", "1", Judgement;
+    ENTER_UNSURE: f64 = 0.5, "p_unsure", "1", Judgement;
     /// An unseen error below this share of the largest force is within what the sensors of such benches resolve (0.683 N of 450 N).
-    ENTER_RESOLVED: f64 = 1.5e-3, "enter_resolved", "1", Judgement;
+    ENTER_RESOLVED: f64 = 1.5e-3, "e_res/F_max", "1", Judgement;
     /// The static search's own boundaries of a verdict.
-    ENTER_EXPLAINED: f64 = 0.8, "enter_explained", "1", Judgement;
+    ENTER_EXPLAINED: f64 = 0.8, "q_expl", "1", Judgement;
     /// A muscle that had been loaded this long before the first run was not rested, s.
-    JUDGE_LOADED_LONG: f64 = 1e3, "judge_loaded_long", "s", Judgement;
+    JUDGE_LOADED_LONG: f64 = 1e3, "T_long", "s", Judgement;
     /// The pressure of the picture of force over time, as a share of the highest.
-    JUDGE_PICTURED: f64 = 0.75, "judge_pictured", "1", Judgement;
+    JUDGE_PICTURED: f64 = 0.75, "P_pic/P_max", "1", Judgement;
     /// Below this the carried part has no sign of its own, kPa.
-    LAW_NO_SIGN: f64 = 1.0, "law_no_sign", "kPa", Judgement;
-    /// Most steps of a fit.
-    LAW_MOST_STEPS: usize = 10, "law_most_steps", "1", Judgement;
+    LAW_NO_SIGN: f64 = 1.0, "Δp_0", "kPa", Judgement;
+    /// Steps of a fit of the law with memory, at most.
+    LAW_MOST_STEPS: usize = 10, "n_GN", "1", Judgement;
     /// Below this relaxed share the stress-free pressure is not identifiable.
-    LAW_TELLS_BALANCE: f64 = 0.05, "law_tells_balance", "1", Judgement;
+    LAW_TELLS_BALANCE: f64 = 0.05, "c_b", "1", Judgement;
     /// Step of the numeric derivative in the stress-free pressure, kPa.
-    LAW_NUDGE: f64 = 1.0, "law_nudge", "kPa", Judgement;
+    LAW_NUDGE: f64 = 1.0, "h_b", "kPa", Judgement;
     /// Longest step of the stress-free pressure, kPa.
-    LAW_BALANCE_STEP: f64 = 30.0, "law_balance_step", "kPa", Judgement;
+    LAW_BALANCE_STEP: f64 = 30.0, "ΔP_b,max", "kPa", Judgement;
     /// The relaxed share has settled when it changes by less.
-    LAW_SETTLED_SHARE: f64 = 5e-4, "law_settled_share", "1", Judgement;
+    LAW_SETTLED_SHARE: f64 = 5e-4, "δc", "1", Judgement;
     /// Shuffles; the least p is one over this.
-    PLACES_SHUFFLES: usize = 499, "places_shuffles", "1", Judgement;
+    PLACES_SHUFFLES: usize = 499, "n_shuffle", "1", Judgement;
     /// A place is reported when it holds at least this much more of the error than of the points.
-    PLACES_CONCENTRATED: f64 = 1.5, "places_concentrated", "1", Judgement;
+    PLACES_CONCENTRATED: f64 = 1.5, "r_place", "1", Judgement;
     /// And when chance gives as much no more often than this.
-    PLACES_SURE: f64 = 0.05, "places_sure", "1", Judgement;
+    PLACES_SURE: f64 = 0.05, "p_place", "1", Judgement;
     /// Slopes below this do not show a shift, as a share of the largest.
-    RUN_OFFSET_FLAT: f64 = 0.03, "run_offset_flat", "1", Judgement;
+    RUN_OFFSET_FLAT: f64 = 0.03, "r_flat,S", "1", Judgement;
     /// Fewest points from which an offset is taken.
-    RUN_OFFSET_LEAST: usize = 5, "run_offset_least", "1", Judgement;
+    RUN_OFFSET_LEAST: usize = 5, "n_o", "1", Judgement;
     /// Weak prior that keeps a coefficient finite which no row determines.
-    SHIFT_FIT_PRIOR: f64 = 1e-8, "shift_fit_prior", "1", Judgement;
+    SHIFT_FIT_PRIOR: f64 = 1e-8, "λ_θ", "1", Judgement;
     /// Averages over this time where no pulses are found, s: longer than the ring of a pulse.
-    STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "staircase_without_pulses", "s", Judgement;
+    STAIRCASE_WITHOUT_PULSES: f64 = 0.5, "t_avg", "s", Judgement;
     /// The pressure has turned when it has gone back by this share of the run's range: above a regulator's ripple.
-    STAIRCASE_TURN: f64 = 0.04, "staircase_turn", "1", Judgement;
+    STAIRCASE_TURN: f64 = 0.04, "δ_turn", "1", Judgement;
     /// Widths of the contact that are tried in a table.
     TABLE_WIDTHS: ([f64; 3]) = [6e4, 9e4, 1.2e5], "P_c", "Pa", Derived("from the width of the knee at full length to the pressure at which a bladder carries no stress");
     /// Times for which the muscle may have been loaded before a mounting that follows another, half a decade apart: one branch of the memory
     /// is no finer.
-    TABLE_LOADED: ([f64; 4]) = [3e1, 1e2, 3e2, 1e3], "T_0", "s", Judgement;
+    TABLE_LOADED: ([f64; 4]) = [3e1, 1e2, 3e2, 1e3], "T_m", "s", Judgement;
     /// Such a load was not recorded: it is assumed only if it removes this share of the squared error of left-out runs.
     TABLE_LOADED_GAIN: f64 = 0.25, "g_0", "1", Judgement;
     /// Least deadband of a table beside the contact: pretension of a mounted muscle pulls before any pressure.
@@ -168,6 +184,8 @@ pam_data::criteria! {
     TABLE_LEAST_SLACK: usize = 20, "n_slack", "1", Derived("a median that one run does not decide");
     /// Nodes of a table of held lengths over the pressures that pull.
     HELD_NODES: usize = 10, "n_node", "1", Derived("a knee of 60 kPa among 600 kPa; the penalties decide, not their number");
+    /// The highest pressure that may be commanded has a node where it is this many node distances above those recorded, at most this many above them.
+    HELD_LAST_NODE: ((f64, f64)) = (0.3, 2.0), "d_node", "1", Judgement;
     /// Most elastic coefficients of it.
     HELD_ORDER: (usize) = 4, "M", "1", Derived("the base model's order");
     /// Weights of second differences of its curves that are tried, per point.
@@ -178,6 +196,10 @@ pam_data::criteria! {
     HELD_FOLDS: usize = 12, "n_fold", "1", Cost;
     /// Standard deviation of the area's scale: 5 % of the diameter.
     HELD_GAMMA_ERROR: f64 = 0.1, "s_gamma", "1", Derived("as the prior of the diameter in a fit");
+    /// Prior mean of the deadband, as a share of the highest pressure.
+    HELD_DEADBAND: f64 = 0.1, "P_0/P_max", "1", Judgement;
+    /// Prior deviation of the deadband, as a share of the highest pressure.
+    HELD_DEADBAND_ERROR: f64 = 1.0, "s_P_0/P_max", "1", Derived("the whole range: it binds nothing");
     /// Standard deviation of the part that each elastic coefficient after the first gives, as a share of that of the one before.
     HELD_NEXT_COEFFICIENT: f64 = 0.2, "r_E", "1", Derived("a wall whose stress is nearly proportional to strain; decides only where lengths are missing");
     /// Residual that weighs the priors, as a share of the largest force.
@@ -188,8 +210,8 @@ pam_data::criteria! {
     LENGTH_ERROR: f64 = 1e-3, "delta_L", "m", Derived("a tape measure; the bound of a fit of lengths");
     /// Lengths that such a search tries over this range, to both sides.
     LENGTH_STEPS: usize = 17, "n_L", "1", Cost;
-    /// Runs that are predicted from the others by tables: of more, every n-th is left out together.
-    TABLE_FOLDS: usize = 12, "n_fold", "1", Cost;
+    /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
+    TABLE_FOLDS: usize = 12, "n_fold,T", "1", Cost;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;
 }

@@ -64,4 +64,6 @@ pam_data::criteria! {
     RAMP_LAW_LEAVES: f64 = 0.7, "S_ramp/S_0", "1", Judgement;
     /// A row of a ramp is judged once friction is within this of its full direction.
     RAMP_TURNED: f64 = 0.1, "1 - z_ramp", "1", Judgement;
+    /// The change of pressure by which friction has turned is found to this part of the change of pressure over which it turns.
+    RAMP_PRECISION: f64 = 1e-3, "dP/b", "1", Cost;
 }

@@ -26,6 +26,8 @@ pam_data::criteria! {
     RECORDING_FOLDS: u32 = 10, "n_rec", "1", Convention("ten-fold cross-validation");
     /// Recordings of held length from which they are left out by recordings.
     FEWEST_RECORDINGS: usize = 4, "n_rec,min", "1", Judgement;
+    /// Recordings at one pressure are left out one by one where they are this few and this many.
+    RECORDINGS_HELD_OUT: ((usize, usize)) = (2, 10), "n_rec,lim", "1", Derived("one is left to learn from; more than ten are many refits");
     /// Pressure levels from which a pressure can be left out.
     FEWEST_LEVELS_HELD_OUT: usize = 3, "n_P,min", "1", Derived("two others span a range to interpolate in");
     /// Held lengths from which a length can be left out; it is predicted where others lie on both sides.
@@ -44,8 +46,6 @@ pam_data::criteria! {
     CHANGE_POINT_RATIO: f64 = 7.35, "LR", "1", Published("-2 ln(1 - sqrt 0.95): B. E. Hansen, Econometrica 68 (2000) 575-603, doi 10.1111/1468-0262.00124");
     /// Change points over the campaign that are tried for a second maximum of the likelihood.
     CHANGE_POINT_SCAN: usize = 250, "n_scan", "1", Cost;
-    /// Standard deviations of an interval of 95 %.
-    NORMAL_95: f64 = 1.96, "z", "1", Convention("normal quantile");
     /// Calibration of a model weight w: p = w^B q, logit q = A + C logit(explained).
     CALIBRATION: ([f64; 3]) = [2.33, 0.62, 0.37], "A, B, C", "1", Trials("690 names of a development and two opened sets: on trials left out, log score 0.341 (0.359 without) and calibration error 0.026 (0.070). Learned on the development set alone, calibration errors of 0.054 and 0.049 on the opened ones. cargo run --release -p pam-diagnose --example calibrate_diagnosis -- SET...");
     /// Model weights and shares are kept this far from certainty.

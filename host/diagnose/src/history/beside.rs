@@ -5,6 +5,7 @@
 
 use model_core::effects::Parameter;
 use pam_fit::bench::Candidate;
+use pam_fit::numerics::jackknife;
 use pam_fit::numerics::student::{chance_beyond, half_width_95};
 
 use super::campaign::{Points, Run};
@@ -12,7 +13,7 @@ use super::criteria::{KEPT_ERRORS, MEMORY_KEPT_GAIN};
 use super::held_table::predicts_better;
 use super::law::{Law, Layer};
 use super::run_offset;
-use super::unseen::{self, Unseen, jackknife};
+use super::unseen::{self, Unseen};
 use crate::criteria::candidates::AMPLITUDE_BEYOND;
 use crate::paired::errors_below;
 
@@ -98,7 +99,7 @@ impl Tried {
     /// The coefficient of the last column, and its standard error.
     fn amplitude(&self) -> (f64, f64) {
         let last = |l: &Law| l.fit.theta.last().copied().unwrap_or(0.0);
-        (last(&self.law), jackknife(&self.unseen.folds.iter().map(last).collect::<Vec<_>>()))
+        (last(&self.law), jackknife::deviation(&self.unseen.folds.iter().map(last).collect::<Vec<_>>()))
     }
 }
 

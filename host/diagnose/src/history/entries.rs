@@ -1,8 +1,8 @@
 //! Entries of an answer that the history layer makes.
 
 use model_core::effects::{EffectName, Role};
+use pam_data::statistics::NORMAL_95;
 use pam_fit::bench::{BenchName, Candidate};
-use pam_fit::confidence_band::HALF_95;
 
 use super::History;
 use super::answer::Estimate;
@@ -31,7 +31,7 @@ pub fn is_from_history(missing: &Missing) -> bool {
 pub(super) fn memory(history: &History, peak: f64) -> Missing {
     let spectrum = history.law.one_time_constant_ratio >= ENTER_REFUTES;
     let probability = if spectrum { ENTER_SURE } else { ENTER_UNSURE };
-    let error = |e: &Estimate| e.half().map(|h| h / HALF_95);
+    let error = |e: &Estimate| e.half().map(|h| h / NORMAL_95);
     let mut parameters = vec![
         ParameterValue {
             name: RELAXED_SHARE.into(),
@@ -43,7 +43,7 @@ pub(super) fn memory(history: &History, peak: f64) -> Missing {
         ParameterValue {
             name: BALANCE_PRESSURE.into(),
             value: 1e3 * history.law.balance_pressure.value,
-            std: history.law.balance_pressure.half().map(|h| 1e3 * h / HALF_95),
+            std: history.law.balance_pressure.half().map(|h| 1e3 * h / NORMAL_95),
             unit: "Pa".into(),
             outside_known_range: false,
         },
@@ -112,7 +112,7 @@ pub(super) fn slack_reading(reading: &SlackReading) -> Missing {
     let Contrast { half, units, .. } = reading.mean;
     let follows_pressure = reading.effect == BenchName::CrossTalk;
     // The least of several slopes has no interval of its own.
-    let std = half.filter(|_| !follows_pressure).map(|h| h / HALF_95);
+    let std = half.filter(|_| !follows_pressure).map(|h| h / NORMAL_95);
     let parameters = info.parameters.iter().take(1);
     Missing {
         parameters: parameters.map(|p| ParameterValue::of(p, reading.amplitude, std)).collect(),

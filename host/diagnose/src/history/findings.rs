@@ -3,7 +3,9 @@
 //! Units of uncertainty are mountings or runs, never rows: rows of one run are not independent measurements.
 
 use super::campaign::Points;
-use super::criteria::{NEIGHBOURS, PULLS, SHORTENED};
+use super::criteria::{
+    NEIGHBOURS, PLATEAU_FREE, PLATEAU_FROM, PLATEAU_ROWS, PLATEAU_WITHIN, PULLS, SHORTENED,
+};
 use super::shift_fit::knot_step;
 use pam_fit::numerics::student::half_width_95;
 
@@ -169,18 +171,18 @@ pub(super) fn gap_left(points: &Points, predicted: &[f64]) -> Option<Contrast> {
 
 /// Force gained in tenfold time while the pressure stays at its top, N a decade: mean over runs of shortened mountings; unit: run.
 pub(super) fn plateau_creep(points: &Points) -> Option<Contrast> {
-    let top = 0.006 * points.highest();
+    let top = PLATEAU_WITHIN * points.highest();
     let of = |run: usize| {
         let (from, to) = points.runs[run].points;
         let highest = points.pressure[from..to].iter().copied().fold(0.0, f64::max);
         let held: Vec<usize> =
             (from..to).filter(|i| points.direction[*i] == 1 && points.pressure[*i] > highest - top).collect();
-        if held.len() < 6 {
+        if held.len() < PLATEAU_ROWS {
             return f64::NAN;
         }
         let first = points.time[held[0]];
         let rows = held.iter().map(|i| {
-            let decades = (points.time[*i] - first + 2.0).log10();
+            let decades = (points.time[*i] - first + PLATEAU_FROM).log10();
             (decades, points.pressure[*i] - highest, points.force[*i])
         });
         slope_beside(&rows.collect::<Vec<_>>())
@@ -199,7 +201,7 @@ fn slope_beside(rows: &[(f64, f64, f64)]) -> f64 {
         (xx, xp, pp, xy, py) = (xx + x * x, xp + x * p, pp + p * p, xy + x * y, py + p * y);
     }
     let left = xx - xp * xp / pp.max(1e-12);
-    if left > 0.05 * xx && xx > 1e-6 { (xy - xp * py / pp.max(1e-12)) / left } else { f64::NAN }
+    if left > PLATEAU_FREE * xx && xx > 1e-6 { (xy - xp * py / pp.max(1e-12)) / left } else { f64::NAN }
 }
 
 /// Slope of the force over pressure at full length near the highest pressures, N/kPa: the muscle's effective area, for an end effect over a stock.

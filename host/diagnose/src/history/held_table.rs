@@ -30,7 +30,7 @@ use pam_fit::table_file::{FitQuality, Uncertainty};
 mod round;
 
 use super::campaign::Points;
-use super::criteria::{HELD_NODES, HELD_ORDER, KEPT_ERRORS, MEMORY_KEPT_GAIN, SHORTENED};
+use super::criteria::{HELD_LAST_NODE, HELD_NODES, HELD_ORDER, KEPT_ERRORS, MEMORY_KEPT_GAIN, SHORTENED};
 use crate::paired;
 use round::{Round, Smoothing};
 
@@ -316,8 +316,8 @@ fn numbers(table: &MuscleTable) -> Vec<f64> {
 fn nodes(low: f64, high: f64, max_pressure: f64) -> Vec<f64> {
     let step = (high - low) / (HELD_NODES - 1) as f64;
     let mut nodes: Vec<f64> = (0..HELD_NODES).map(|j| low + step * j as f64).collect();
-    if max_pressure > high + 0.3 * step {
-        nodes.push(max_pressure.min(high + 2.0 * step));
+    if max_pressure > high + HELD_LAST_NODE.0 * step {
+        nodes.push(max_pressure.min(high + HELD_LAST_NODE.1 * step));
     }
     nodes
 }

@@ -6,7 +6,9 @@ use super::answer::{
     MemoryRefusal, Mounting, RunError, StaticCurve, UnseenRuns,
 };
 use super::campaign::Points;
-use super::criteria::{JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES};
+use super::criteria::{
+    FIRST_RUN_WAYS, JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES,
+};
 use super::findings::{self, Contrast, Visits};
 use super::gap;
 use super::law::Law;
@@ -214,7 +216,8 @@ fn first_run(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool) -> 
     let firsts = findings::first_differences(points, visits);
     // Every first difference above every later one: by chance once in the number of ways to choose them.
     let least = firsts.iter().copied().fold(f64::INFINITY, f64::min);
-    let above = later.iter().all(|l| *l < least) && findings::ways(firsts.len(), later.len()) >= 20.0;
+    let above =
+        later.iter().all(|l| *l < least) && findings::ways(firsts.len(), later.len()) >= FIRST_RUN_WAYS;
     let found = deficit.mean > 0.0 && (deficit.is_positive() || above);
     let (_, unseen) = fits.best();
     let left = findings::first_run_left(points, &unseen.predicted);

@@ -14,17 +14,17 @@
 //! The law was found on isometric recordings at four lengths; under motion it is a prediction.
 
 use pam_data::statistics::extremes;
+use pam_fit::numerics::bspline::CubicSplines;
 use rayon::prelude::*;
 
 use super::campaign::Points;
 use super::criteria::{
-    BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, ENGAGED, LAW_BALANCE_STEP, LAW_MOST_STEPS,
-    LAW_NO_SIGN, LAW_NUDGE, LAW_SETTLED_SHARE, LAW_TELLS_BALANCE, LOADED, NEAR_BALANCE, PAUSES, RAMP,
-    THRESHOLD_FROM, THRESHOLD_TO,
+    BALANCE_FIRST, BALANCE_MOST, BALANCE_MOVES, BALANCE_START, DAMPING, ENGAGED, LAW_BALANCE_STEP,
+    LAW_MOST_STEPS, LAW_NO_SIGN, LAW_NUDGE, LAW_SETTLED_SHARE, LAW_TELLS_BALANCE, LOADED, NEAR_BALANCE,
+    PAUSES, RAMP, THRESHOLD_BEYOND, THRESHOLD_FROM, THRESHOLD_TO,
 };
 use super::memory::Clockwork;
 use super::shift_fit::{self, ShiftFit};
-use super::spline::Spline;
 
 /// Assumptions about times that are not recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub(super) struct Choice {
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
     pub points: &'a Points,
-    pub spline: Spline,
+    pub spline: CubicSplines,
     /// `P_th,m`, kPa.
     pub thresholds: Vec<f64>,
     /// Pauses between runs, s, with the steps of the states over each.
@@ -83,7 +83,7 @@ pub(super) fn thresholds_of(points: &Points, use_point: &[bool]) -> Vec<f64> {
             });
             let mean = tangents.sum::<f64>() / 7.0;
             // A muscle that never pulls at this length begins above what was tried.
-            if mean.is_finite() { mean.clamp(-top, 1.2 * top) } else { top }
+            if mean.is_finite() { mean.clamp(-top, THRESHOLD_BEYOND * top) } else { top }
         })
         .collect()
 }
@@ -130,7 +130,8 @@ impl<'a> Layer<'a> {
     /// The law at one choice of unrecorded times: Gauss–Newton in `c`, further coefficients and, where it is free, `P_b`.
     fn fit_at(&self, use_point: &[bool], choice: Choice, further: &[Vec<f64>], start: Option<&Law>) -> Law {
         let p = self.points;
-        let first = self.thresholds[p.longest()].clamp(0.5 * BALANCE_START, 1.3 * BALANCE_START);
+        let first = self.thresholds[p.longest()]
+            .clamp(BALANCE_FIRST.0 * BALANCE_START, BALANCE_FIRST.1 * BALANCE_START);
         let mut balance = match start {
             Some(law) => law.balance,
             None if self.balance_is_free => first,

@@ -11,9 +11,11 @@ use super::criteria::{
 };
 use super::law::{Law, Layer};
 use super::shift_fit;
-use super::spline::{Banded, Spline};
-use super::unseen::{jackknife, shifted_curves};
-use pam_fit::numerics::median;
+use super::spline::Banded;
+use super::unseen::shifted_curves;
+use pam_data::statistics::{deviation_from_median, median, midpoint_median};
+use pam_fit::numerics::bspline::CubicSplines;
+use pam_fit::numerics::jackknife;
 use pam_fit::numerics::student::half_width_95;
 
 /// What happened to a run, or from a run on.
@@ -44,7 +46,7 @@ pub(super) fn offsets(layer: &Layer<'_>, law: &Law) -> Vec<f64> {
     (0..points.runs.len()).map(|r| offset(points, &layer.spline, &shifted, r).unwrap_or(f64::NAN)).collect()
 }
 
-fn offset(points: &Points, spline: &Spline, shifted: &[f64], run: usize) -> Option<f64> {
+fn offset(points: &Points, spline: &CubicSplines, shifted: &[f64], run: usize) -> Option<f64> {
     let mounting = points.runs[run].mounting;
     let mut band = Banded::penalty(spline.len(), super::criteria::SMOOTHNESS, super::criteria::RIDGE);
     let mut weights = vec![0.0; spline.len()];
@@ -77,19 +79,11 @@ fn offset(points: &Points, spline: &Spline, shifted: &[f64], run: usize) -> Opti
 pub(super) fn deviation(points: &Points, offsets: &[f64]) -> f64 {
     let mut away = Vec::new();
     for mounting in &points.mountings {
-        let own: Vec<f64> = mounting.runs.iter().map(|r| offsets[*r]).filter(|o| o.is_finite()).collect();
-        let middle = midpoint(&own);
+        let mut own: Vec<f64> = mounting.runs.iter().map(|r| offsets[*r]).filter(|o| o.is_finite()).collect();
+        let middle = midpoint_median(&mut own);
         away.extend(own.iter().map(|o| (o - middle).abs()));
     }
-    1.4826 * median(&mut away)
-}
-
-/// The median; of an even number the mean of the middle two.
-fn midpoint(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let n = sorted.len();
-    if n == 0 { 0.0 } else { 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]) }
+    deviation_from_median(median(&mut away))
 }
 
 /// The runs of a mounting whose offset is known, with it.
@@ -104,7 +98,7 @@ fn bad_run(points: &Points, mounting: usize, offsets: &[f64], deviation: f64) ->
     if (own.len() as f64) < BAD_RUN_RUNS {
         return None;
     }
-    let middle = midpoint(&own.iter().map(|o| o.1).collect::<Vec<_>>());
+    let middle = midpoint_median(&mut own.iter().map(|o| o.1).collect::<Vec<_>>());
     let mut away: Vec<(usize, f64)> = own.iter().map(|(k, o)| (*k, o - middle)).collect();
     away.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     let ((run, shift), next) = (away[0], away[1].1.abs());
@@ -158,7 +152,7 @@ fn slip(layer: &Layer<'_>, law: &Law, mounting: usize, offsets: &[f64]) -> Optio
     let (stepped, thetas) = shifted_curves(layer, &with, &full.theta);
     let (plain, _) = shifted_curves(layer, &without, &law.fit.theta);
     let steps: Vec<f64> = thetas.iter().filter_map(|t| t.last().copied()).collect();
-    let error = jackknife(&steps);
+    let error = jackknife::deviation(&steps);
     let here = |i: usize| points.mounting[i] == mounting;
     let (before, after) = (plain.sizes(points, here).rms, stepped.sizes(points, here).rms);
     let likely = shift.abs() > half_width_95(steps.len().saturating_sub(1)) * error

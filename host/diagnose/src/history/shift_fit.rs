@@ -5,8 +5,9 @@
 //! curve would be lost. Bands of four and a border of `J` columns: `O(rows (4 + J)²)`.
 
 use super::campaign::Points;
-use super::criteria::{DAMPING, RIDGE, SHIFT_FIT_PRIOR, SMOOTHNESS, SMOOTHNESS_STATIC};
-use super::spline::{Banded, Spline};
+use super::criteria::{DAMPING, KNOTS, RIDGE, SHIFT_FIT_PRIOR, SMOOTHNESS, SMOOTHNESS_STATIC};
+use super::spline::Banded;
+use pam_fit::numerics::bspline::CubicSplines;
 
 /// Coefficients of shifts, and of the curve of each mounting.
 #[derive(Clone, Debug, Default)]
@@ -15,9 +16,9 @@ pub(super) struct ShiftFit {
     pub curves: Vec<Vec<f64>>,
 }
 
-/// The splines of a campaign: knots every 1, 2 or 5 × 10ⁿ kPa, about thirteen below the highest pressure.
+/// The splines of a campaign: knots every 1, 2 or 5 × 10ⁿ kPa, about `KNOTS` below the highest pressure.
 pub(super) fn knot_step(highest: f64) -> f64 {
-    let aimed = highest.max(1e-3) / 13.0;
+    let aimed = highest.max(1e-3) / KNOTS;
     let decade = 10.0_f64.powf(aimed.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade);
     let nearer = |a: &f64, b: &f64| (a / aimed).ln().abs().total_cmp(&(b / aimed).ln().abs());
@@ -25,15 +26,15 @@ pub(super) fn knot_step(highest: f64) -> f64 {
 }
 
 /// On shifted pressures: one knot below zero, four above the highest pressure.
-pub(super) fn shifted_spline(highest: f64) -> Spline {
+pub(super) fn shifted_spline(highest: f64) -> CubicSplines {
     let step = knot_step(highest);
-    Spline::new(-step, step, (highest / step).ceil() as usize + 5)
+    CubicSplines::clamped(-step, step, (highest / step).ceil() as usize + 5)
 }
 
 /// On measured pressures.
-pub(super) fn static_spline(highest: f64) -> Spline {
+pub(super) fn static_spline(highest: f64) -> CubicSplines {
     let step = knot_step(highest);
-    Spline::new(0.0, step, (highest / step).ceil() as usize + 1)
+    CubicSplines::clamped(0.0, step, (highest / step).ceil() as usize + 1)
 }
 
 /// `Σ q_j θ_j` at a point.
@@ -53,7 +54,7 @@ struct Block {
 /// `columns` are the derivatives of the shift in each coefficient, kPa.
 pub(super) fn solve(
     points: &Points,
-    spline: &Spline,
+    spline: &CubicSplines,
     use_point: &[bool],
     shifts: &[f64],
     columns: &[Vec<f64>],
@@ -135,7 +136,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Fits the coefficients of the shifts and a curve for each mounting to the points in use.
 pub(super) fn fit(
     points: &Points,
-    spline: &Spline,
+    spline: &CubicSplines,
     use_point: &[bool],
     columns: &[Vec<f64>],
     start: &[f64],
@@ -159,7 +160,7 @@ pub(super) fn fit(
 /// What a fit predicts at a point, N.
 pub(super) fn predict(
     points: &Points,
-    spline: &Spline,
+    spline: &CubicSplines,
     columns: &[Vec<f64>],
     fit: &ShiftFit,
     i: usize,
@@ -169,7 +170,13 @@ pub(super) fn predict(
 }
 
 /// `dS/dP` of a fit at a point, N/kPa.
-pub(super) fn slope(points: &Points, spline: &Spline, columns: &[Vec<f64>], fit: &ShiftFit, i: usize) -> f64 {
+pub(super) fn slope(
+    points: &Points,
+    spline: &CubicSplines,
+    columns: &[Vec<f64>],
+    fit: &ShiftFit,
+    i: usize,
+) -> f64 {
     let local = spline.at(points.pressure[i] + shift(columns, &fit.theta, i));
     local.slope(&fit.curves[points.mounting[i]])
 }
@@ -177,7 +184,7 @@ pub(super) fn slope(points: &Points, spline: &Spline, columns: &[Vec<f64>], fit:
 /// A static curve through chosen points, on measured pressures; `None` of no point.
 pub(super) fn static_curve(
     points: &Points,
-    spline: &Spline,
+    spline: &CubicSplines,
     chosen: impl Iterator<Item = usize>,
 ) -> Option<Vec<f64>> {
     let mut band = Banded::penalty(spline.len(), SMOOTHNESS_STATIC, RIDGE);

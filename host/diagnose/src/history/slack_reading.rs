@@ -7,8 +7,8 @@
 //! Unit of uncertainty: mounting.
 
 use pam_data::statistics;
+use pam_data::statistics::median;
 use pam_fit::bench::{BenchName, Candidate};
-use pam_fit::numerics::median;
 
 use super::answer::{Estimate, Finding, FindingDetail};
 use super::campaign::Points;

@@ -1,5 +1,6 @@
 //! Each run predicted from the other runs of the muscle: the static curves, and the law with memory.
 
+use pam_fit::numerics::jackknife;
 use rayon::prelude::*;
 
 use super::campaign::Points;
@@ -47,18 +48,11 @@ impl Unseen {
         Sizes { rms: (squares / n).sqrt(), mean: sum / n, count }
     }
 
-    /// Standard error of a quantity over delete-one-run folds (of many runs, delete-a-group) (jackknife): `√((n−1)/n Σ(θ_j − θ̄)²)`.
+    /// Standard error of a quantity over delete-one-run folds (of many runs, delete-a-group), by the jackknife.
     pub(super) fn standard_error(&self, quantity: impl Fn(&Law) -> f64) -> f64 {
         let values: Vec<f64> = self.folds.iter().map(quantity).collect();
-        jackknife(&values)
+        jackknife::deviation(&values)
     }
-}
-
-/// See [`Unseen::standard_error`].
-pub(super) fn jackknife(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n.max(1.0);
-    ((n - 1.0).max(0.0) / n.max(1.0) * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
 /// Whether a run has others of its mounting to be predicted from.

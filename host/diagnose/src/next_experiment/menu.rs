@@ -2,7 +2,12 @@
 
 use model_core::muscle::Muscle;
 
-use crate::criteria::planning::{MENU_PRESSURES, SLOW_STROKE};
+use crate::criteria::planning::{
+    MENU_DWELL_AT, MENU_DWELL_SPEED, MENU_DWELL_TURNS, MENU_DWELLS, MENU_MINUTES, MENU_NESTED,
+    MENU_NESTED_SPEEDS, MENU_PART, MENU_PRESSURE_RATE, MENU_PRESSURES, MENU_RAMP_LENGTHS, MENU_RAMP_SPEED,
+    MENU_RAMP_TIME, MENU_RAMPS, MENU_REST, MENU_REST_LOOPS, MENU_SAMPLES, MENU_SETTLE, MENU_SPEEDS,
+    MENU_TARE, SLOW_STROKE,
+};
 use crate::experiment::Motion;
 use crate::protocol_simulation::{Place, Protocol, Step, free_stroke};
 
@@ -60,30 +65,35 @@ impl Bench {
     /// The same steps at both pressures, with tares before and after.
     fn each(&self, name: &str, inner: impl Fn(f64) -> Vec<Step>) -> Protocol {
         let tare =
-            |name: &str| [Step::File { name: name.into() }, Step::Tare { seconds: 10.0 }, Step::EndFile];
+            |name: &str| [Step::File { name: name.into() }, Step::Tare { seconds: MENU_TARE }, Step::EndFile];
         let mut step = tare("tare_before").to_vec();
         for p in self.levels {
-            step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 2.0 });
+            step.push(Step::Pressure {
+                to_kpa: p,
+                rate_kpa_s: Some(MENU_PRESSURE_RATE),
+                settle_s: MENU_SETTLE,
+            });
             step.push(Step::File { name: format!("{name}_{p:.0}kPa") });
             step.extend(inner(p));
             step.push(Step::EndFile);
         }
         step.extend(tare("tare_after"));
-        Protocol { name: name.to_owned(), sample_hz: 20.0, step }
+        Protocol { name: name.to_owned(), sample_hz: MENU_SAMPLES, step }
     }
 
     fn speeds(&self) -> Protocol {
         self.each("speeds", |_| {
-            [0.3, 1.0, 4.0, 16.0].map(|v| self.loops(0.9, v, if v < 1.0 { 1 } else { 2 })).to_vec()
+            MENU_SPEEDS.map(|(times, count)| self.loops(MENU_PART, times, count)).to_vec()
         })
     }
 
     fn dwells(&self) -> Protocol {
         self.each("dwells", |_| {
-            let mut steps = vec![self.loops(0.9, 2.0, 1)];
-            for seconds in [1.0, 10.0, 100.0] {
-                for turn in [0.9, 0.1] {
-                    steps.extend([self.go(0.5, 2.0), Step::Hold { seconds }, self.go(turn, 2.0)]);
+            let mut steps = vec![self.loops(MENU_PART, MENU_DWELL_SPEED, 1)];
+            for seconds in MENU_DWELLS {
+                for turn in MENU_DWELL_TURNS {
+                    let go = |part: f64| self.go(part, MENU_DWELL_SPEED);
+                    steps.extend([go(MENU_DWELL_AT), Step::Hold { seconds }, go(turn)]);
                 }
             }
             steps
@@ -91,25 +101,25 @@ impl Bench {
     }
 
     fn nested(&self) -> Protocol {
-        let places = [0.9, 0.25, 0.75, 0.4, 0.6, 0.25, 0.9, 0.0];
         self.each("nested", |_| {
-            [1.0, 8.0].iter().flat_map(|times| places.map(|p| self.go(p, *times))).collect()
+            MENU_NESTED_SPEEDS.iter().flat_map(|times| MENU_NESTED.map(|p| self.go(p, *times))).collect()
         })
     }
 
     fn ramps(&self) -> Protocol {
         self.each("ramps", |p| {
-            let rate_kpa_s = Some(settable(p / 20.0));
-            let to = |to: f64| Step::Pressure { to_kpa: settable(to), rate_kpa_s, settle_s: 2.0 };
-            let ramps = || [0.4 * p, p, 0.4 * p, p].map(to);
-            [0.0, 0.3, 0.6].iter().flat_map(|x| std::iter::once(self.go(*x, 4.0)).chain(ramps())).collect()
+            let rate_kpa_s = Some(settable(p / MENU_RAMP_TIME));
+            let to = |to: f64| Step::Pressure { to_kpa: settable(to), rate_kpa_s, settle_s: MENU_SETTLE };
+            let ramps = || MENU_RAMPS.map(|part| to(part * p));
+            let at = |x: &f64| std::iter::once(self.go(*x, MENU_RAMP_SPEED)).chain(ramps());
+            MENU_RAMP_LENGTHS.iter().flat_map(at).collect()
         })
     }
 
     fn rest(&self) -> Protocol {
-        let mut rest = self.each("rest", |_| vec![self.loops(0.9, 1.0, 3)]);
+        let mut rest = self.each("rest", |_| vec![self.loops(MENU_PART, 1.0, MENU_REST_LOOPS)]);
         let again = rest.step.clone();
-        rest.step.push(Step::Rest { seconds: 1800.0 });
+        rest.step.push(Step::Rest { seconds: MENU_REST });
         rest.step.extend(again.into_iter().map(|s| match s {
             Step::File { name } => Step::File { name: format!("{name}_again") },
             other => other,
@@ -122,11 +132,11 @@ impl Bench {
 pub(super) fn menu(muscle: &Muscle<f64>, low: f64, high: f64) -> Vec<Item> {
     let bench = Bench::new(muscle, low, high);
     vec![
-        Item { motion: Motion::Speeds, minutes: 8.0, protocol: bench.speeds() },
-        Item { motion: Motion::Dwells, minutes: 10.0, protocol: bench.dwells() },
-        Item { motion: Motion::NestedLoops, minutes: 6.0, protocol: bench.nested() },
-        Item { motion: Motion::PressureRamps, minutes: 9.0, protocol: bench.ramps() },
-        Item { motion: Motion::Rest, minutes: 38.0, protocol: bench.rest() },
+        Item { motion: Motion::Speeds, minutes: MENU_MINUTES[0], protocol: bench.speeds() },
+        Item { motion: Motion::Dwells, minutes: MENU_MINUTES[1], protocol: bench.dwells() },
+        Item { motion: Motion::NestedLoops, minutes: MENU_MINUTES[2], protocol: bench.nested() },
+        Item { motion: Motion::PressureRamps, minutes: MENU_MINUTES[3], protocol: bench.ramps() },
+        Item { motion: Motion::Rest, minutes: MENU_MINUTES[4], protocol: bench.rest() },
     ]
 }
 

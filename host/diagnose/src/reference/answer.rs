@@ -2,6 +2,8 @@
 
 #![allow(non_snake_case, reason = "units are spelled as in the JSON")]
 
+use pam_data::statistics::NORMAL_95;
+use pam_fit::numerics::student::half_width;
 use serde::Serialize;
 
 use super::criteria::POSSIBLE;
@@ -419,14 +421,11 @@ impl ChangeReport {
 
 /// A size with its 95 % interval. `freedom` widens it as Student's t does; `slopes` is the share by which the slopes may be wrong.
 pub(super) fn size(parameter: (&str, &str), value: f64, std: f64, freedom: f64, slopes: f64) -> Size {
-    let z = 1.959_964;
-    // Expansion of Student's quantile for not too few degrees of freedom.
-    let t = z + (z * z * z + z) / (4.0 * freedom.max(1.0));
-    let half = (t * std).hypot(slopes * value);
+    let half = (half_width(0.05, freedom.max(1.0)) * std).hypot(slopes * value);
     Size {
         name: parameter.0.into(),
         value,
-        std: half / z,
+        std: half / NORMAL_95,
         low: value - half,
         high: value + half,
         unit: parameter.1.into(),

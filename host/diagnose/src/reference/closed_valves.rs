@@ -18,9 +18,11 @@ use super::criteria::{
     LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_REWEIGHTED, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST,
     LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
 };
+use super::detectable;
 use super::motion;
 use super::runs::{Run, Runs};
 use super::shapes::{CHANGES, Change};
+use pam_data::statistics::{deviation_from_median, median};
 use pam_fit::bench::Candidate;
 
 /// A rest between two steps.
@@ -108,9 +110,7 @@ fn rate(own: &[Rest], before: &[&Rest], range: f64) -> Option<f64> {
             |f: &dyn Fn(&(f64, f64)) -> f64| beside.iter().zip(&weights).map(|(r, w)| w * f(r)).sum::<f64>();
         rate = -sum(&|r| r.0 * r.1) / sum(&|r| r.0 * r.0);
         let residuals: Vec<f64> = beside.iter().map(|(p, e)| (e + rate * p).abs()).collect();
-        let mut sorted = residuals.clone();
-        sorted.sort_by(f64::total_cmp);
-        let limit = LOSS_CLIP * 1.4826 * sorted[sorted.len() / 2];
+        let limit = LOSS_CLIP * deviation_from_median(median(&mut residuals.clone()));
         weights = residuals.iter().map(|r| if *r > limit { limit / r } else { 1.0 }).collect();
     }
     rate.is_finite().then_some(rate)
@@ -198,13 +198,11 @@ pub(super) fn add(report: &mut ChangeReport, loss: &Loss, none: f64) {
     report.probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let named = probability >= NAMED;
     if !named {
-        // The odds that the prior requires of the evidence; 1.28: with 90 %.
-        let z = (2.0 * (1.0 / prior).ln() + 6.0).sqrt();
         report.considered.push(Considered {
             effect: about.name.into(),
             gain: probability,
             why_not: WhyNot::of(true, probability),
-            detectable: Some(loss.std * (z + 1.28)),
+            detectable: Some(detectable::size(loss.std, detectable::required(1.0 / prior, 0.0))),
             unit: "1/s".into(),
         });
         return;

@@ -6,17 +6,17 @@
 use model_core::muscle::Muscle;
 use model_core::units::{Length, Pressure};
 use nalgebra::{DMatrix, DVector};
-use pam_data::statistics::{extremes, range};
+use pam_data::statistics::{extremes, quantile, range};
 
 use super::answer::NotComparable;
 use super::criteria::{
-    BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE, COMBINED_SMOOTH,
-    COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS, STROKES_ENDS,
-    TABLE_SURFACE_STEP, TURN,
+    BEYOND, COMBINED_BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE,
+    COMBINED_SMOOTH, COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS,
+    STROKES_ENDS, TABLE_SURFACE_STEP, TURN,
 };
 use super::motion::turning;
 use super::runs::{Mounted, Run, Runs, mounted_anew};
-use super::strokes::{ends, percentile};
+use super::strokes::ends;
 use super::surface::{Surface, bin};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
@@ -25,7 +25,8 @@ use pam_fit::table_file::TableFile;
 /// Whether something beside the pressure moves the stroke: at one pressure it takes values further apart than a held length does,
 /// smoothly and back and forth. A mounting that yields with the force, and a noisy sensor, do not.
 pub(super) fn swings(r: &Recording) -> bool {
-    let travel = percentile(&r.stroke, STROKES_ENDS.1) - percentile(&r.stroke, STROKES_ENDS.0);
+    let mut strokes = r.stroke.clone();
+    let travel = quantile(&mut strokes, STROKES_ENDS.1) - quantile(&mut strokes, STROKES_ENDS.0);
     if !(travel > recording::HELD) {
         return false;
     }
@@ -37,7 +38,7 @@ pub(super) fn swings(r: &Recording) -> bool {
         return false;
     }
     let turns = turning(&r.stroke, COMBINED_SWING * travel, 0.0).windows(2).filter(|w| w[0] != w[1]).count();
-    let (low, high) = (percentile(&r.pressure, 0.0), percentile(&r.pressure, 1.0));
+    let (low, high) = extremes(&r.pressure);
     let mut at = vec![Vec::new(); COMBINED_LENGTHS];
     for (p, x) in r.pressure.iter().zip(&r.stroke) {
         at[bin(*p, low, high, COMBINED_LENGTHS)].push(*x);
@@ -106,11 +107,14 @@ impl Plane {
         Ok(Self { coefficients: solved.ok_or_else(unusable)?, ..plane })
     }
 
-    /// Pressure and stroke within −1 to 1.
+    /// Pressure and stroke, −1 to 1 over the range.
     fn scaled(&self, pressure: f64, stroke: f64) -> (f64, f64) {
         let one =
             |v: f64, (low, high): (f64, f64)| 2.0 * (v - low) / (high - low).max(f64::MIN_POSITIVE) - 1.0;
-        (one(pressure, self.pressures).clamp(-1.1, 1.1), one(stroke, self.strokes).clamp(-1.1, 1.1))
+        (
+            one(pressure, self.pressures).clamp(-COMBINED_BEYOND, COMBINED_BEYOND),
+            one(stroke, self.strokes).clamp(-COMBINED_BEYOND, COMBINED_BEYOND),
+        )
     }
 
     fn terms(&self, pressure: f64, stroke: f64, direction: f64) -> DVector<f64> {

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 
 use super::cells::{Cell, Means, rms_after};
 use super::contrast::{Contrast, evidence, log_mean, log_sum};
-use super::criteria::{COURSE_LEAD, COURSE_PART, COURSE_WHOLE};
+use super::criteria::{COURSE_INTERVAL, COURSE_LEAD, COURSE_PART, COURSE_WHOLE};
 use super::shapes::Change;
 
 /// How a change continues.
@@ -227,7 +227,7 @@ pub(super) fn of(
     })
 }
 
-/// The likeliest start and the stretch of likely starts that holds 95 %; the starts that were tried fall.
+/// The likeliest start and the stretch of likely starts that holds `COURSE_INTERVAL`; the starts that were tried fall.
 fn start(tried: &[Tried]) -> Option<Start> {
     let logs: Vec<f64> = tried.iter().map(|t| t.log).collect();
     let total = log_sum(&logs);
@@ -236,7 +236,7 @@ fn start(tried: &[Tried]) -> Option<Start> {
     let best = *order.first()?;
     let (mut sum, mut late, mut early) = (0.0, best, best);
     for i in order {
-        if sum >= 0.95 {
+        if sum >= COURSE_INTERVAL {
             break;
         }
         sum += (logs[i] - total).exp();

@@ -3,10 +3,12 @@
 use super::cells::Cell;
 use super::contrast::{log_mean, student};
 use super::criteria::{
-    CELLS, LAG_AFTER_TURN, LAG_CLIP, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, LAGS, MEDIAN_VARIANCE,
+    CELLS, LAG_AFTER_TURN, LAG_CLIP, LAG_CORRELATION, LAG_FLOOR, LAG_GAP, LAG_RUNS, LAG_SIZES, LAG_SPREADS,
+    LAG_WEIGHED_BY, LAGS, MEDIAN_VARIANCE,
 };
 use super::runs::{Run, Runs};
 use super::surface::{Surface, bin};
+use pam_data::statistics::{deviation_from_median, median, midpoint_median};
 
 /// The lag of a run that explains its force best, s: positive where the force is late, negative where the pressure reading is.
 #[derive(Debug, Clone, Copy, Default)]
@@ -81,9 +83,7 @@ fn clear_of_turns(run: &Run, longest: f64) -> Vec<bool> {
 impl<'a> Scorer<'a> {
     fn new(run: &'a Run, surface: &'a Surface, clear: &[bool]) -> Self {
         let mut steps: Vec<f64> = run.time.windows(2).map(|w| w[1] - w[0]).collect();
-        let middle = steps.len() / 2;
-        let usual =
-            if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        let usual = median(&mut steps);
         let rows = (1..run.time.len())
             .filter(|i| run.time[*i] - run.time[i - 1] < LAG_GAP * usual && clear[*i])
             .map(|i| {
@@ -124,7 +124,7 @@ impl<'a> Scorer<'a> {
         let e = self.residuals(&self.run.force, &self.forces(&self.run.pressure));
         let square: f64 = e.iter().map(|v| v * v).sum();
         let next: f64 = e.windows(2).map(|w| w[0] * w[1]).sum();
-        let correlation = if square > 0.0 { (next / square).clamp(0.0, 0.99) } else { 0.0 };
+        let correlation = if square > 0.0 { (next / square).clamp(0.0, LAG_CORRELATION) } else { 0.0 };
         2.0 * square / e.len().max(1) as f64 * (1.0 + correlation) / (1.0 - correlation)
     }
 }
@@ -189,7 +189,7 @@ fn score(run: &Run, surface: &Surface, first: usize, rubs: bool) -> Score {
     } else {
         tried[best].0
     };
-    let moved = later(0.05);
+    let moved = later(LAG_WEIGHED_BY);
     let weight = 1e-9 + scorer.rows.iter().map(|(i, _)| (moved[*i] - expected[*i]).powi(2)).sum::<f64>();
     Score { lag, weight, variance: spread(&tried, lag, scorer.temperature()) }
 }
@@ -233,13 +233,7 @@ fn shift(runs: &Runs, scores: &[Score]) -> Shift {
     }
     let lag = weighted_median(&contrasts);
     let mut sizes: Vec<f64> = deviations.iter().map(|d: &f64| d.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let mad = match sizes.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => sizes[n / 2],
-        n => (sizes[n / 2 - 1] + sizes[n / 2]) / 2.0,
-    };
-    let limit = 3.0 * (1.4826 * mad).max(LAG_FLOOR);
+    let limit = LAG_SPREADS * deviation_from_median(midpoint_median(&mut sizes)).max(LAG_FLOOR);
     let freedom = deviations.len().saturating_sub(2 * contrasts.len()) as f64;
     let square: f64 = deviations.iter().map(|d| d.clamp(-limit, limit).powi(2)).sum();
     let spread = (LAG_RUNS * LAG_FLOOR * LAG_FLOOR + square) / (LAG_RUNS + freedom);

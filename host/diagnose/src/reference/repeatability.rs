@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::cells::Cell;
-use super::criteria::{REMOUNT, REPEATABILITY_PULLS, REPEATS};
+use super::criteria::{CELL_ROWS, CELL_SLACK, REMOUNT, REPEATABILITY_PULLS, REPEATS};
 
 /// What repeats: standard deviations in per cent of the largest force, learned by restricted maximum likelihood on untouched runs of the
 /// development half and rounded; floors as stated.
@@ -107,7 +107,7 @@ pub(super) fn covariance(cells: &[Cell], setting: &Setting) -> DMatrix<f64> {
                 v += both / square(unit) * (-0.5 * apart * apart).exp() * way;
             }
             if i == j {
-                v += square(r.cell) * (0.2 + a.means.active) * (1.0 + 2.0 / a.rows)
+                v += square(r.cell) * (CELL_SLACK + a.means.active) * (1.0 + CELL_ROWS / a.rows)
                     + a.means.variance / square(unit);
             }
             k[(i, j)] = v * square(unit);

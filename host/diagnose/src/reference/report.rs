@@ -3,7 +3,8 @@
 use super::answer::{ChangeReport, Left, NotComparable, Place, Remark, Repeatability, Verdict};
 use super::closed_valves::Loss;
 use super::criteria::{
-    COMBINED_UNREST, HELD, NAMED, OTHER_LENGTH, PRIOR_NONE, REPORT_REGULATED, UNSTATED_ERROR,
+    COMBINED_UNREST, HELD, NAMED, OTHER_LENGTH, PRIOR_LIMITS, PRIOR_NONE, REGULATED_QUANTILES,
+    REPORT_REGULATED, UNSTATED_ERROR,
 };
 use super::held_out::Unseen;
 use super::isometric;
@@ -92,7 +93,9 @@ fn protocol(campaign: &Campaign, side: &str) -> Result<Protocol> {
         let mut sorted = r.pressure.clone();
         sorted.sort_by(f64::total_cmp);
         let at = |share: f64| sorted[(share * (sorted.len() - 1) as f64) as usize];
-        if !sorted.is_empty() && at(0.9) - at(0.1) > REPORT_REGULATED * at(1.0).abs() {
+        if !sorted.is_empty()
+            && at(REGULATED_QUANTILES.1) - at(REGULATED_QUANTILES.0) > REPORT_REGULATED * at(1.0).abs()
+        {
             // Several levels in one file are levels still, as long as each stroke has one.
             let levels = super::strokes::levels(&[campaign]);
             if levels.len() < 2 || super::strokes::unrest(r) > COMBINED_UNREST * at(1.0).abs() {
@@ -235,7 +238,7 @@ fn files(campaign: &Campaign) -> Vec<String> {
 
 pub(super) fn prior(options: &Options, usual: f64) -> f64 {
     let none = options.prior_changed.map_or(usual, |p| 1.0 - p);
-    if none > 0.01 && none < 0.99 { none } else { none.clamp(0.01, 0.99) }
+    none.clamp(PRIOR_LIMITS.0, PRIOR_LIMITS.1)
 }
 
 fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<(ChangeReport, Option<Loss>)> {

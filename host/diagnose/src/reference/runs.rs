@@ -5,6 +5,7 @@ use super::criteria::{INTERPOLATE_FROM, NEW_VISIT, PAUSE, SAME_STROKE};
 use super::motion;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Clock, Recording};
+use pam_data::statistics::median;
 
 /// Whether AFTER was remounted since BEFORE.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,12 +66,7 @@ pub(super) struct Runs {
 
 /// The middle of a recording's strokes, m.
 fn stroke(recording: &Recording) -> f64 {
-    let mut values = recording.stroke.clone();
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(&mut recording.stroke.clone())
 }
 
 /// Strokes that are further apart than a mounting's tolerance.

@@ -1,5 +1,6 @@
 //! Rows that both sides have, and sides in the wrong order.
 
+use pam_data::statistics::median;
 use std::collections::BTreeSet;
 
 use super::answer::Remark;
@@ -62,8 +63,7 @@ pub(super) fn apart(before: &Campaign, after: &Campaign) -> Result<()> {
 pub(super) fn one_actuator(before: &Campaign, after: &Campaign) -> Result<()> {
     let stated = |campaign: &Campaign| {
         let mut all: Vec<f64> = campaign.recordings.iter().filter_map(|r| r.rest_length).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied()
+        (!all.is_empty()).then(|| median(&mut all))
     };
     match (stated(before), stated(after)) {
         (Some(old), Some(new)) if !((new / old - 1.0).abs() <= OTHER_LENGTH) => Err(Error::new(

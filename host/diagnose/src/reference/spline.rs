@@ -1,6 +1,7 @@
 //! The force of one mounting over pressure and direction as a penalised spline.
 
 use nalgebra::{DMatrix, DVector};
+use pam_fit::numerics::bspline::CubicSplines;
 
 use super::criteria::{GAP_PENALTY, GAP_RIDGE, GCV_PRICE, RUN_RIDGE, SPLINE_COEFFICIENTS, SPLINE_INTERVALS};
 
@@ -16,46 +17,26 @@ pub(super) struct Point {
 /// `F = A(P) + d H(P)`, effects of single runs taken out.
 #[derive(Debug, Clone)]
 pub(super) struct Spline {
-    low: f64,
-    high: f64,
+    basis: CubicSplines,
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
 }
 
-/// The first of the four basis functions that are not zero, with their values or slopes.
-fn basis(x: f64, low: f64, high: f64, slope: bool) -> (usize, [f64; 4]) {
-    let h = (high - low) / SPLINE_INTERVALS as f64;
-    let z = ((x - low) / h).clamp(0.0, SPLINE_INTERVALS as f64 - 1e-9);
-    let z = if z.is_finite() { z } else { 0.0 };
-    let (i, v) = (z as usize, z.fract());
-    let w = 1.0 - v;
-    let values = if slope {
-        [
-            -w * w / 2.0 / h,
-            (9.0 * v * v - 12.0 * v) / 6.0 / h,
-            (-9.0 * v * v + 6.0 * v + 3.0) / 6.0 / h,
-            v * v / 2.0 / h,
-        ]
-    } else {
-        [
-            w * w * w / 6.0,
-            (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0,
-            (-3.0 * v * v * v + 3.0 * v * v + 3.0 * v + 1.0) / 6.0,
-            v * v * v / 6.0,
-        ]
-    };
-    (i, values)
+/// The splines over the range of pressure. Their knots continue beyond it, so that the penalty is the same everywhere.
+fn basis(low: f64, high: f64) -> CubicSplines {
+    CubicSplines::unclamped(low, (high - low) / SPLINE_INTERVALS as f64, SPLINE_INTERVALS)
 }
 
 /// The design: both curves and, where there are several runs, four effects of each.
 fn design(points: &[Point], runs: usize, low: f64, high: f64) -> DMatrix<f64> {
     let effects = if runs < 2 { 0 } else { 4 * runs };
     let mut x = DMatrix::zeros(points.len(), 2 * SPLINE_COEFFICIENTS + effects);
+    let basis = basis(low, high);
     for (row, p) in points.iter().enumerate() {
-        let (i, b) = basis(p.pressure, low, high, false);
-        for (k, value) in b.iter().enumerate() {
-            x[(row, i + k)] = *value;
-            x[(row, SPLINE_COEFFICIENTS + i + k)] = p.direction * value;
+        let local = basis.at(p.pressure);
+        for (k, value) in local.value.iter().enumerate() {
+            x[(row, local.first + k)] = *value;
+            x[(row, SPLINE_COEFFICIENTS + local.first + k)] = p.direction * value;
         }
         if effects > 0 {
             let z = 2.0 * (p.pressure - low) / (high - low) - 1.0;
@@ -118,35 +99,36 @@ impl Spline {
                 let Some(inverse) = inner.cholesky() else { continue };
                 let covariance = inverse.inverse() * (rss / (n - freedom).max(1.0));
                 let coefficients = c.rows(0, 2 * SPLINE_COEFFICIENTS).into_owned();
-                best = Some((score, Self { low, high, coefficients, covariance }));
+                best = Some((score, Self { basis: basis(low, high), coefficients, covariance }));
             }
         }
         best.map(|(_, s)| s)
     }
 
-    fn sum(&self, offset: usize, pressure: f64, slope: bool) -> f64 {
-        let (i, b) = basis(pressure, self.low, self.high, slope);
-        (0..4).map(|k| b[k] * self.coefficients[offset + i + k]).sum()
+    /// The curve whose coefficients begin at `offset`.
+    fn curve(&self, offset: usize) -> &[f64] {
+        &self.coefficients.as_slice()[offset..offset + SPLINE_COEFFICIENTS]
     }
 
-    /// Mean of both directions, SPLINE_COEFFICIENTS.
+    /// Mean of both directions, N.
     pub fn mean(&self, pressure: f64) -> f64 {
-        self.sum(0, pressure, false)
+        self.basis.at(pressure).value(self.curve(0))
     }
 
     /// Slope of the mean over pressure.
     pub fn slope(&self, pressure: f64) -> f64 {
-        self.sum(0, pressure, true)
+        self.basis.at(pressure).slope(self.curve(0))
     }
 
-    /// Half the gap, filling minus mean, SPLINE_COEFFICIENTS.
+    /// Half the gap, filling minus mean, N.
     pub fn gap(&self, pressure: f64) -> f64 {
-        self.sum(SPLINE_COEFFICIENTS, pressure, false)
+        self.basis.at(pressure).value(self.curve(SPLINE_COEFFICIENTS))
     }
 
     /// Variance of the surface, N².
     pub fn variance(&self, pressure: f64, direction: f64) -> f64 {
-        let (i, b) = basis(pressure, self.low, self.high, false);
+        let local = self.basis.at(pressure);
+        let (i, b) = (local.first, local.value);
         let mut index = [(0, 0.0); 8];
         for k in 0..4 {
             index[k] = (i + k, b[k]);

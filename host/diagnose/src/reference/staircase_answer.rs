@@ -11,6 +11,7 @@ use super::criteria::{
     CELLS, COMBINED_SHAPE_ERROR, FEWEST_CELLS, GATE, NAMED, OWN_SLOPE_ERROR, PRIOR_NONE, SCALE_PRIOR, SIZES,
     SLOPE_ERROR, STANDS_OUT, TABLE_INTERVAL, TABLE_SLOPE_ERROR, TABLE_SLOPE_OVER_LENGTH, UNSEEN_EXPLAINED,
 };
+use super::detectable;
 use super::held_out;
 use super::isometric::Analysis;
 use super::naming::Accepted;
@@ -234,9 +235,8 @@ fn alone(analysis: &Analysis) -> Vec<(String, Size)> {
 fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
     let none = prior(options, PRIOR_NONE);
     let round = &analysis.first;
-    let names =
-        round.posterior.all.iter().filter(|(c, _)| matches!(c, Cause::Named(_))).count().max(1) as f64;
-    let prior_name = ((1.0 - none) / names).max(1e-6);
+    let names = round.posterior.all.iter().filter(|(c, _)| matches!(c, Cause::Named(_))).count();
+    let odds = detectable::odds(none, names);
     let middle = SIZES[1] * analysis.surface.largest;
     let open = |change: Change| !analysis.accepted.iter().any(|a| a.change == change);
     CHANGES
@@ -247,10 +247,8 @@ fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
             let p = round.posterior.probability(Cause::Named(change));
             let estimate = round.estimates.iter().find(|e| e.change == change);
             let detectable = estimate.map(|e| {
-                // What the prior, a lead of e³ and the price of the size require of the evidence; 1.28: with 90 %.
                 let price = (middle / e.rms / e.std).powi(2).ln_1p();
-                let z = (2.0 * (none / prior_name).ln() + 6.0 + price).max(0.0).sqrt();
-                e.std * (z + 1.28)
+                detectable::size(e.std, detectable::required(odds, price))
             });
             Considered {
                 effect: about.name.into(),

@@ -4,11 +4,13 @@ use super::answer::{
     ChangeReport, Changed, Considered, Curve, HeldOut, Place, Probability, Reference, Remark, Repeatability,
     Since, Split, Verdict, WhyNot, size,
 };
-use super::criteria::{NAMED, STANDS_OUT, STROKE_PRIOR_NONE, UNSEEN_EXPLAINED};
+use super::criteria::{NAMED, POSSIBLE, STANDS_OUT, STROKE_PRIOR_NONE, STROKE_UNEXPLAINED, UNSEEN_EXPLAINED};
+use super::detectable;
 use super::held_out::Unseen;
 use super::report::{Options, left, prior};
 use super::shapes::{Change, Class};
 use super::stroked::{self, Compared, Weighed};
+use crate::criteria::judgement::DETECTION;
 use pam_data::error::Result;
 
 /// What was compared and tested, as the answer.
@@ -22,7 +24,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
     let (before, after) = stroked::unseen(compared, &named);
     let n = compared.keys.len();
     let noise = (compared.covariance.trace() / (2 * n) as f64).sqrt();
-    let verdict = if named.is_empty() && weighed.none() < 0.1 {
+    let verdict = if named.is_empty() && weighed.none() < STROKE_UNEXPLAINED {
         Verdict::Unexplained
     } else if named.is_empty() {
         Verdict::Consistent
@@ -63,11 +65,11 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
                 effect: c.name().into(),
                 gain: weighed.marginal(*c),
                 why_not: WhyNot::of(true, weighed.marginal(*c)),
-                detectable: weighed.alone.get(c).map(|(_, std)| std * (3.5 + 1.28)),
+                detectable: weighed.alone.get(c).map(|(_, std)| detectable::size(*std, DETECTION)),
                 unit: c.about().changed.size.1.into(),
             })
             .collect(),
-        set: probabilities.iter().filter(|p| p.probability >= 0.05).map(|p| p.cause.clone()).collect(),
+        set: probabilities.iter().filter(|p| p.probability >= POSSIBLE).map(|p| p.cause.clone()).collect(),
         probabilities,
         remarks,
         reference: Reference {
@@ -111,7 +113,7 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
     let shape = &compared.shapes[index];
     let mut competitors: Vec<String> = stroked::ASKED
         .iter()
-        .filter(|c| **c != change && c.class() == about.changed.class && weighed.marginal(**c) >= 0.05)
+        .filter(|c| **c != change && c.class() == about.changed.class && weighed.marginal(**c) >= POSSIBLE)
         .map(|c| c.name().to_owned())
         .collect();
     if change == Change::ForceGain {

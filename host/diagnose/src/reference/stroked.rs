@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::answer::NotComparable;
 use super::contrast::{log_mean, log_sum};
-use super::criteria::{SIZES, STROKE_BINS, STROKE_LENGTH, STROKE_REPEATS, STROKED_FLOOR};
+use super::criteria::{SIZES, STROKE_BINS, STROKE_LENGTH, STROKE_REPEATS, STROKE_SETS, STROKED_FLOOR};
 use super::shapes::{Change, Class};
 use super::strokes::{Band, Key, bands, ends, levels};
 use pam_data::error::{DataCode, Error, Result};
@@ -36,8 +36,6 @@ pub(crate) struct StrokeRepeats {
 /// The changes that are tested for strokes at regulated pressures.
 pub(super) const ASKED: [Change; 4] =
     [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
-/// Sets of them that are compared with each other, by index.
-const SETS: [&[usize]; 9] = [&[], &[0], &[1], &[2], &[3], &[2, 3], &[1, 2], &[1, 3], &[1, 2, 3]];
 
 /// The differences of both campaigns.
 pub(super) struct Compared {
@@ -205,7 +203,7 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
     let rms: Vec<f64> = c.shapes.iter().map(|s| (2.0 * s.norm_squared() / s.len() as f64).sqrt()).collect();
     let mut logs = Vec::new();
     let mut fits: Vec<Option<(DVector<f64>, DMatrix<f64>)>> = Vec::new();
-    for set in SETS {
+    for set in STROKE_SETS {
         if set.is_empty() {
             logs.push(none.ln());
             fits.push(None);
@@ -224,11 +222,11 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
                 Some(-0.5 * grown.determinant().ln() + 0.5 * t * b.dot(&solved))
             })
             .collect();
-        logs.push(log_mean(&each) + ((1.0 - none) / (SETS.len() - 1) as f64).ln());
+        logs.push(log_mean(&each) + ((1.0 - none) / (STROKE_SETS.len() - 1) as f64).ln());
         fits.push(g.cholesky().map(|f| (f.solve(&b), f.inverse())));
     }
     let total = log_sum(&logs);
-    let sets: Vec<(Vec<Change>, f64)> = SETS
+    let sets: Vec<(Vec<Change>, f64)> = STROKE_SETS
         .iter()
         .zip(&logs)
         .map(|(s, l)| (s.iter().map(|k| ASKED[*k]).collect(), (l - total).exp()))
@@ -239,7 +237,7 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
             let unit = rms[*k].max(f64::MIN_POSITIVE);
             (ASKED[*k], (sizes[i] / unit, inverse[(i, i)].max(0.0).sqrt() / unit))
         };
-        SETS[index].iter().enumerate().map(one).collect()
+        STROKE_SETS[index].iter().enumerate().map(one).collect()
     };
     let alone = (1..=ASKED.len()).flat_map(of).collect();
     let mut weighed = Weighed { sets, sizes: BTreeMap::new(), alone };
@@ -247,7 +245,7 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
     let holds = |i: &usize| named.iter().all(|n| weighed.sets[*i].0.contains(n));
     // The set of the named ones alone, where it is one of those tested: what is not named must not share out their sizes.
     let alone = |i: &usize| holds(i) && weighed.sets[*i].0.len() == named.len();
-    let best = (0..SETS.len())
+    let best = (0..STROKE_SETS.len())
         .filter(holds)
         .max_by(|a, b| alone(a).cmp(&alone(b)).then(weighed.sets[*a].1.total_cmp(&weighed.sets[*b].1)))
         .unwrap_or(0);

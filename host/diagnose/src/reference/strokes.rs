@@ -1,16 +1,16 @@
 //! Strokes at regulated pressures, reduced to cells: level of pressure, part of the stroke, direction, stroke.
 
+use pam_data::statistics::{median, quantile, range};
 use std::collections::BTreeMap;
 
 use super::criteria::{
-    LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKES_ENDS, STROKES_FEWEST_ROWS, STROKES_RUN_IN,
-    STROKES_SPEED_OVER, TURN,
+    LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKE_SPEED_QUANTILE, STROKES_ENDS, STROKES_FEWEST_ROWS,
+    STROKES_RUN_IN, STROKES_SPEED_OVER, TURN,
 };
 use super::motion::turning;
 use super::surface::bin;
 use pam_data::error::Result;
 use pam_data::recording::{Campaign, Recording};
-use pam_data::statistics::range;
 
 /// Means of one stroke in one part of it.
 #[derive(Debug, Clone, Copy)]
@@ -64,8 +64,8 @@ pub(crate) fn levels(campaigns: &[&Campaign]) -> Vec<f64> {
 /// Median over the strokes of the range of pressure within one, Pa.
 pub(super) fn unrest(recording: &Recording) -> f64 {
     let own = |rows: std::ops::Range<usize>| range(&recording.pressure[rows]);
-    let ranges: Vec<f64> = strokes(recording).into_iter().map(|s| own(s.0)).collect();
-    percentile(&ranges, 0.5)
+    let mut ranges: Vec<f64> = strokes(recording).into_iter().map(|s| own(s.0)).collect();
+    quantile(&mut ranges, 0.5)
 }
 
 /// Rows and mean pressure of every stroke.
@@ -90,8 +90,7 @@ fn speed(time: &[f64], stroke: &[f64]) -> Vec<f64> {
     if steps.is_empty() {
         return vec![0.0; n];
     }
-    let middle = steps.len() / 2;
-    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let usual = median(&mut steps);
     let half = ((STROKES_SPEED_OVER / usual) as usize).max(3).div_ceil(2);
     (0..n)
         .map(|i| {
@@ -101,17 +100,10 @@ fn speed(time: &[f64], stroke: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-pub(super) fn percentile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = (share * sorted.len().saturating_sub(1) as f64).round() as usize;
-    sorted.get(at).copied().unwrap_or(0.0)
-}
-
 /// Ends of the stroke of a campaign, m.
 pub(crate) fn ends(campaign: &Campaign) -> (f64, f64) {
-    let all: Vec<f64> = campaign.recordings.iter().flat_map(|r| r.stroke.iter().copied()).collect();
-    (percentile(&all, STROKES_ENDS.0), percentile(&all, STROKES_ENDS.1))
+    let mut all: Vec<f64> = campaign.recordings.iter().flat_map(|r| r.stroke.iter().copied()).collect();
+    (quantile(&mut all, STROKES_ENDS.0), quantile(&mut all, STROKES_ENDS.1))
 }
 
 fn parts(
@@ -121,7 +113,8 @@ fn parts(
     number: &mut usize,
 ) -> Vec<(f64, Part)> {
     let speed = speed(&recording.time, &recording.stroke);
-    let fast = STROKE_SPEED * percentile(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.7);
+    let mut speeds: Vec<f64> = speed.iter().map(|v| v.abs()).collect();
+    let fast = STROKE_SPEED * quantile(&mut speeds, STROKE_SPEED_QUANTILE);
     let margin = STROKE_ENDS * (high - low);
     let mut all = Vec::new();
     for (rows, level, direction) in strokes(recording) {

@@ -1,10 +1,11 @@
 //! The force before, tabulated: mean, gap between the directions, slopes and variance over pressure, for every mounting.
 
-use super::criteria::{GRID, POINT_BINS};
+use super::criteria::{GRID, MONOTONE_END, POINT_BINS, USUAL_SLOPE_QUANTILE, USUAL_SLOPE_SHARE};
 use super::interpolate;
 use super::runs::{Run, Runs};
 use super::spline::{Point, Spline};
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::statistics::midpoint_median;
 
 /// One mounting's curves on the common pressures.
 #[derive(Debug, Clone, Default)]
@@ -132,16 +133,12 @@ impl Surface {
         let mut all: Vec<f64> = self.curves.iter().flat_map(|c| c.by_pressure.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
         let Some(last) = all.len().checked_sub(1) else { return };
-        let at = 0.95 * last as f64;
+        let at = USUAL_SLOPE_QUANTILE * last as f64;
         let (i, share) = (at as usize, at.fract());
         let high = all[i] + share * (all[(i + 1).min(last)] - all[i]);
-        let kept: Vec<f64> = all.into_iter().filter(|s| *s > 0.3 * high).collect();
-        let n = kept.len();
-        self.usual_slope = match n {
-            0 => high.abs().max(f64::MIN_POSITIVE),
-            n if n % 2 == 1 => kept[n / 2],
-            n => (kept[n / 2 - 1] + kept[n / 2]) / 2.0,
-        };
+        let mut kept: Vec<f64> = all.into_iter().filter(|s| *s > USUAL_SLOPE_SHARE * high).collect();
+        self.usual_slope =
+            if kept.is_empty() { high.abs().max(f64::MIN_POSITIVE) } else { midpoint_median(&mut kept) };
     }
 
     /// A tabulated curve at a pressure.
@@ -180,8 +177,8 @@ pub(super) fn monotone_slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
         let slope = ((2.0 * ha + hb) * a - ha * b) / (ha + hb);
         if slope * a <= 0.0 {
             0.0
-        } else if a * b <= 0.0 && slope.abs() > 3.0 * a.abs() {
-            3.0 * a
+        } else if a * b <= 0.0 && slope.abs() > MONOTONE_END * a.abs() {
+            MONOTONE_END * a
         } else {
             slope
         }

@@ -1,27 +1,15 @@
 //! Columns that seem to be in another unit than the reference's, and another actuator.
 
 use super::answer::Remark;
-use super::criteria::{FORCE_RATIO, UNIT_FAR, UNIT_NEAR};
+use super::criteria::{FORCE_RATIO, SAME_PRESSURES, UNIT_FACTORS, UNIT_FAR, UNIT_NEAR};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
 use pam_data::statistics::range;
 
-/// Factors between units that are often confused.
-const FACTORS: [(f64, &str); 8] = [
-    (1e3, "a thousand (such as N and kN, Pa and kPa)"),
-    (1e6, "a million (such as Pa and MPa)"),
-    (1e2, "a hundred (such as kPa and bar)"),
-    (1e5, "a hundred thousand (such as Pa and bar)"),
-    (4.448_222, "4.448 (N and lbf)"),
-    (9.806_65, "9.807 (N and kgf)"),
-    (6.894_757, "6.895 (kPa and psi)"),
-    (14.503_8, "14.50 (bar and psi)"),
-];
-
 /// The factor that a ratio is near to, either way round.
 fn factor(ratio: f64) -> Option<&'static str> {
     let near = |f: f64| (ratio / f - 1.0).abs() < UNIT_NEAR || (ratio * f - 1.0).abs() < UNIT_NEAR;
-    FACTORS.iter().find(|(f, _)| near(*f)).map(|(_, words)| *words)
+    UNIT_FACTORS.iter().find(|(f, _)| near(*f)).map(|(_, words)| *words)
 }
 
 fn columns(campaign: &Campaign) -> (Vec<f64>, Vec<f64>) {
@@ -63,7 +51,7 @@ pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<Remark>> 
         }
     }
     let ratio = largest(&f1) / largest(&f0);
-    let same_pressures = (largest(&p1) / largest(&p0) - 1.0).abs() < 0.1;
+    let same_pressures = (largest(&p1) / largest(&p0) - 1.0).abs() < SAME_PRESSURES;
     let mut remarks = Vec::new();
     if same_pressures && !(ratio >= FORCE_RATIO.0 && ratio <= FORCE_RATIO.1) {
         remarks.push(Remark::ForceRatio(ratio));

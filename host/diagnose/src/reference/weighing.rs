@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::cells::{Cell, rms_after};
 use super::contrast::{Contrast, evidence};
 use super::course::{self, Candidate, Course, Kind};
-use super::criteria::SIZES;
+use super::criteria::{LAG_CONTRADICTED, LAG_CORRECTED, SIZES};
 use super::gate::{self, GatedChange};
 use super::lag::{self, Shift};
 use super::posterior::{Cause, Posterior};
@@ -153,7 +153,6 @@ fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) 
     let image = &contrast.projector * &freed;
     let gain = 0.5 * (contrast.energy - freed.dot(&image)) / scale;
     let (a, b) = (trace.dot(&(&contrast.projector * &trace)), trace.dot(&image));
-    // The size is known from the rows in motion; the cells may put it right by a third.
-    let own = evidence(a, b, scale, &[0.3]);
-    (change, gain + own.max(-5.0) + lag.changed)
+    let own = evidence(a, b, scale, &[LAG_CORRECTED]);
+    (change, gain + own.max(LAG_CONTRADICTED) + lag.changed)
 }

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::{followed, slip_beyond_play};
 use crate::baselines::Baseline;
 use crate::criteria::rest_friction::{
-    FOLLOWING_PRESSURES, LATER_SHARES, LATER_TIMES, NEARBY_FACTORS, RAMP_CARRIED, RAMP_LAW_LEAVES, RAMP_ROWS,
-    RAMP_TURNED,
+    FOLLOWING_PRESSURES, LATER_SHARES, LATER_TIMES, NEARBY_FACTORS, RAMP_CARRIED, RAMP_LAW_LEAVES,
+    RAMP_PRECISION, RAMP_ROWS, RAMP_TURNED,
 };
 use crate::rows::Rows;
 use pam_fit::numerics::least_squares::least_squares;
@@ -34,7 +34,7 @@ impl Turning {
         };
         // The rest falls to 1/e after the one change for the first set of bristles, and after the other for the second.
         let (mut low, mut high) = (self.over, self.over * LATER_TIMES);
-        while high - low > 1e-3 * self.over {
+        while high - low > RAMP_PRECISION * self.over {
             let middle = 0.5 * (low + high);
             if left(middle) > (-1.0_f64).exp() { low = middle } else { high = middle }
         }

@@ -7,7 +7,7 @@ use crate::criteria::rest_friction::{
 };
 use crate::rows::Rows;
 use pam_data::recording::white_noise;
-use pam_fit::numerics::median;
+use pam_data::statistics::median;
 
 /// Where the force steps while the length is held, hold by hold: static friction was released there, shaken by more than the pressure's
 /// samples show.

@@ -3,7 +3,7 @@
 use super::Rows;
 use super::gather::Gathered;
 use crate::criteria::rows::{LONGEST_BLOCK, SHORTEST_BLOCK, TYPICAL_BLOCK};
-use pam_fit::numerics::{median, quantile};
+use pam_data::statistics::{median, quantile};
 
 /// Half-strokes become blocks; those that are very short join the one before, those very long are cut, so that blocks
 /// outlast the noise's memory and are still many.

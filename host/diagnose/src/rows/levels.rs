@@ -6,7 +6,7 @@ use crate::criteria::rows::{
     LEVEL_ROWS, LEVEL_SPREAD, LEVEL_SPREAD_OF_MEAN, LEVEL_TENTHS, MOST_LEVELS, RANGE_NODES, SAME_LEVEL,
     SAME_LEVEL_PRESSURE, SAME_NODE,
 };
-use pam_fit::numerics::quantile;
+use pam_data::statistics::quantile;
 
 /// The pressures of a campaign.
 pub(super) struct Levels {

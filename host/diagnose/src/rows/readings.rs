@@ -5,7 +5,7 @@ use crate::criteria::rows::{
 };
 use pam_data::recording::{Campaign, usual_change, white_noise};
 use pam_data::statistics::extremes;
-use pam_fit::numerics::median;
+use pam_data::statistics::median;
 use pam_fit::{Clip, clip};
 
 /// Isolated spikes of a series: rows that stand out from the middle of their five neighbours by more than noise can, and by more than the

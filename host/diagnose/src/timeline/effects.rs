@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::series::{Kind, Point, Series, What};
 use super::{Options, Visit, of_campaign};
 use crate::reference::{self, Against, ChangeReport};
-use pam_fit::confidence_band::HALF_95;
+use pam_data::statistics::NORMAL_95;
 
 /// The comparisons, in the order of the campaigns; `None` for the reference.
 ///
@@ -47,7 +47,7 @@ pub(super) fn series(comparisons: &[Option<ChangeReport>]) -> Vec<Series> {
         let Some(r) = report else { return Some(Point { value: 0.0, std: Some(0.0), named: false }) };
         let of = |size: &reference::answer::Size, named| Point {
             value: size.value,
-            std: Some((size.high - size.low) / 2.0 / HALF_95),
+            std: Some((size.high - size.low) / 2.0 / NORMAL_95),
             named,
         };
         match r.missing.iter().find(|m| m.effect == name) {

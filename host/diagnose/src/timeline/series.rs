@@ -1,6 +1,6 @@
 //! A quantity over the campaigns.
 
-use pam_fit::confidence_band::HALF_95;
+use pam_data::statistics::NORMAL_95;
 
 /// Where a quantity is from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl Point {
     /// Ends of the 95 % interval; `None` without a standard error.
     #[must_use]
     pub fn interval(&self) -> Option<(f64, f64)> {
-        self.std.map(|s| (self.value - HALF_95 * s, self.value + HALF_95 * s))
+        self.std.map(|s| (self.value - NORMAL_95 * s, self.value + NORMAL_95 * s))
     }
 }
 

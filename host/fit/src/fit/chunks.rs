@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::numerics::median;
+use pam_data::statistics::median;
 
 /// Chunks per unit of contraction.
 pub(crate) const PER_CONTRACTION: f64 = 500.0;

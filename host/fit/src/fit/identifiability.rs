@@ -1,5 +1,6 @@
 //! Which parameters the recordings determine: correlations, and the reason why a parameter is not identifiable.
 
+use pam_data::statistics::NORMAL_95;
 use std::fmt;
 
 use serde::Serialize;
@@ -124,7 +125,7 @@ pub(crate) fn not_determined(solution: &Solution, root: &CovarianceRoot) -> Vec<
     let mut all: Vec<NotDetermined> = deadband(solution).into_iter().collect();
     for k in 0..kinds {
         let loose: Vec<usize> = (0..levels.len())
-            .filter(|i| !(values[*i][k].abs() > 1.96 * table.std(1 + k * levels.len() + i)))
+            .filter(|i| !(values[*i][k].abs() > NORMAL_95 * table.std(1 + k * levels.len() + i)))
             .collect();
         let Some(first) = loose.first() else { continue };
         // Of the pressures the one with the largest correlation is reported.

@@ -1,5 +1,6 @@
 //! Where the curves over pressure get their nodes: at the tested levels, or spread over a continuous range.
 
+use pam_data::statistics::{extremes, median};
 use std::collections::HashMap;
 
 use model_core::spline::MAX_NODES;
@@ -101,10 +102,9 @@ fn row_weights(points: &Points) -> impl Fn(&Point) -> f64 {
     }
     let intervals: HashMap<u32, f64> =
         spans.into_iter().map(|(r, (first, last, rows))| (r, (last - first) / rows)).collect();
-    let mut sorted: Vec<f64> = intervals.values().copied().filter(|i| *i > 0.0).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let (least, most) = (sorted.first().copied().unwrap_or(1.0), sorted.last().copied().unwrap_or(1.0));
-    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+    let mut known: Vec<f64> = intervals.values().copied().filter(|i| *i > 0.0).collect();
+    let (least, most) = extremes(&known);
+    let usual = median(&mut known);
     let differ = most > RATES * least;
     move |p| {
         let interval = intervals.get(&p.recording).copied().filter(|i| differ && *i > 0.0);

@@ -6,7 +6,7 @@ use super::points::Points;
 use super::problem::Problem;
 use super::screen::{Outlier, PointUse, Screen};
 use super::weights::scatter;
-use crate::numerics::median;
+use pam_data::statistics::median;
 
 /// Finds single rows far from the others of their point and takes them out of its mean.
 ///

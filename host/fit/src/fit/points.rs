@@ -4,10 +4,10 @@
 //! pressure and stroke hardly change within. A piece ends where the direction turns, where stroke or pressure has moved on
 //! by a small share of their ranges, or where it holds enough rows. One pass, linear in rows; memory is that of the points.
 
-use crate::numerics::median;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, HELD, Recording, white_noise};
+use pam_data::statistics::{deviation_from_median, median};
 
 /// A mean over consecutive rows of one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -329,7 +329,7 @@ fn row_noise(campaign: &Campaign, rows: usize) -> f64 {
         .filter_map(|r| r.force.as_deref())
         .flat_map(|f| f.windows(3).step_by(stride).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
         .collect();
-    median(&mut seconds) / (0.6745 * 6.0_f64.sqrt())
+    deviation_from_median(median(&mut seconds)) / 6.0_f64.sqrt()
 }
 
 #[cfg(test)]

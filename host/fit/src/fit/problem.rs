@@ -12,10 +12,10 @@ use super::normal_equations::NormalEquations;
 use super::points::{Point, Points};
 use super::screen::{Clip, PointUse, Screen};
 use super::smoothing::Smoothing;
-use crate::numerics::median;
 use crate::numerics::spline_basis::SplineBasis;
 use crate::numerics::symmetric::Symmetric;
 use pam_data::recording::HELD;
+use pam_data::statistics::median;
 
 /// A campaign as a linear problem.
 #[derive(Debug, Clone)]

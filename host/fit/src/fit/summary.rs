@@ -1,5 +1,6 @@
 //! The figures of a fit, as text and as JSON.
 
+use pam_data::statistics::{NORMAL_95, median};
 use std::collections::BTreeSet;
 
 use serde::Serialize;
@@ -185,7 +186,7 @@ impl Summary {
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // An interval of zero width would claim certainty.
-        let half = 1.96 * self.deadband_std_kPa;
+        let half = NORMAL_95 * self.deadband_std_kPa;
         let places = (1..4).find(|p| half >= 0.5 * 10.0_f64.powi(-p)).unwrap_or(4) as usize;
         let determined = self.not_determined.iter().all(|n| n.parameter != DEADBAND);
         let (interval, meaning) = if determined {
@@ -244,7 +245,7 @@ impl std::fmt::Display for Summary {
                 "\n{}: {:.3} ± {:.3} {} (described {:.3}; {:.0} % determined by the recordings{})",
                 a.name,
                 a.value,
-                1.96 * a.std,
+                NORMAL_95 * a.std,
                 a.unit,
                 a.nominal,
                 100.0 * a.determined,
@@ -304,7 +305,7 @@ pub(super) fn summarise(
         smoothing: [solution.smoothing.elastic, solution.smoothing.friction],
         turn_zone: screen.turn_zone,
         condition: Some(problem.design.orthonormal.condition).filter(|c| c.is_finite()),
-        correlations: Correlations::at(solution, &uncertain.root, levels[levels.len() / 2]),
+        correlations: Correlations::at(solution, &uncertain.root, median(&mut levels.to_vec())),
         not_determined: not_determined(solution, &uncertain.root),
         physical: None,
         outliers: screen.outliers.iter().map(|o| outlier_row(o, campaign)).collect(),

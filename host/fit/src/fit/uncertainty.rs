@@ -19,11 +19,11 @@ use super::problem::Problem;
 use super::screen::Screen;
 use super::solution::Solution;
 use super::weights::scatter;
-use crate::confidence_band::HALF_95;
 use crate::numerics::covariance_root::CovarianceRoot;
 use crate::numerics::jackknife::covariance_root;
 use crate::numerics::student::half_width_95;
 use crate::numerics::symmetric::Symmetric;
+use pam_data::statistics::NORMAL_95;
 
 /// The uncertainty of the parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,9 +113,9 @@ fn leave_out(
     root
 }
 
-/// Factor on the standard deviations by which 1.96 of them are the 95 % interval of Student's t, of a jackknife over so few blocks.
+/// Factor on the standard deviations by which `NORMAL_95` of them are the 95 % interval of Student's t, of a jackknife over so few blocks.
 fn few_blocks(blocks: usize) -> f64 {
-    half_width_95(blocks.saturating_sub(1).max(1)) / HALF_95
+    half_width_95(blocks.saturating_sub(1).max(1)) / NORMAL_95
 }
 
 /// The residuals in standard deviations of their group (NaN where a point does not take part), correlated within half-strokes only.
@@ -234,8 +234,8 @@ mod tests {
 
     #[test]
     fn few_blocks_widen_the_interval_by_students_t() {
-        assert!((few_blocks(2) * HALF_95 - 12.706).abs() < 1e-2);
-        assert!((few_blocks(6) * HALF_95 - 2.571).abs() < 1e-2);
+        assert!((few_blocks(2) * NORMAL_95 - 12.706).abs() < 1e-2);
+        assert!((few_blocks(6) * NORMAL_95 - 2.571).abs() < 1e-2);
         assert!((few_blocks(100_000) - 1.0).abs() < 1e-3);
     }
 

@@ -13,7 +13,7 @@ use super::points::{Point, Range};
 use super::problem::Problem;
 use super::screen::{PointUse, Screen};
 use super::smoothing::Smoothing;
-use crate::numerics::median;
+use pam_data::statistics::{deviation_from_median, median};
 
 /// The model error that is acceptable for control, as a share of the blocked force. Below it more rows do not raise a weight.
 const INEXACT: f64 = 0.002;
@@ -81,7 +81,7 @@ pub(super) fn scatter(problem: &Problem, screen: &Screen, residuals: &[f64]) -> 
     let force = problem.points.force.span();
     by_group
         .iter_mut()
-        .map(|r| (median(r) / 0.6745).max(problem.points.row_noise).max(1e-6 * force))
+        .map(|r| deviation_from_median(median(r)).max(problem.points.row_noise).max(1e-6 * force))
         .collect()
 }
 

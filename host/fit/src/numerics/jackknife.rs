@@ -30,6 +30,19 @@ pub fn variances<V: AsRef<[f64]>>(without: &[V]) -> Vec<f64> {
         .collect()
 }
 
+/// The standard deviation of one estimate; 0 of less than two blocks.
+///
+/// ```
+/// use pam_fit::numerics::jackknife::deviation;
+/// assert!((deviation(&[2.5, 2.0, 1.5]).powi(2) - 1.0 / 3.0).abs() < 1e-12);
+/// assert_eq!(deviation(&[]), 0.0);
+/// ```
+#[must_use]
+pub fn deviation(without: &[f64]) -> f64 {
+    let sets: Vec<[f64; 1]> = without.iter().map(|w| [*w]).collect();
+    variances(&sets).first().map_or(0.0, |v| v.sqrt())
+}
+
 /// The root of the covariance of `numbers` parameters from their changes `θ₍₋b₎ − θ`, one set per block that was left out.
 #[must_use]
 pub fn covariance_root(changes: &[Vec<f64>], numbers: usize) -> CovarianceRoot {

@@ -1,10 +1,10 @@
 //! Where the model is wrong: along each coordinate, and over time.
 
 use crate::{Axis, Colour, Figure, Mark, Panel, Section, residual_table, significant, wording};
+use pam_data::statistics::median;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Profile};
 use pam_fit::RecordingResidual;
-use pam_fit::numerics::median;
 
 /// A coordinate's name and numbers as an engineer reads them.
 fn shown(profile: &Profile) -> (String, &'static str, f64, f64) {

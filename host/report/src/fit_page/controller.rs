@@ -2,6 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Panel, Section, fixed, significant};
 use super::view::{Banded, View};
+use pam_data::statistics::NORMAL_95;
 
 /// Contractions at which the force is evaluated, shares of the tested range.
 const PLACES: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
@@ -19,7 +20,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
          model. The valve's error is not included.",
         significant(worst, 2),
         significant(100.0 * worst / blocked.max(f64::MIN_POSITIVE), 2),
-        significant(pam_fit::confidence_band::HALF_95 * view.fit.summary.rms_N, 2)
+        significant(NORMAL_95 * view.fit.summary.rms_N, 2)
     ));
     section.figure(pressure_for_force(view, &places));
     section.figure(error_of_force(view, &places));

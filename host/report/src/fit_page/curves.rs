@@ -2,7 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Panel, Section, fixed, significant};
 use super::view::{Banded, View};
-use pam_fit::confidence_band::HALF_95;
+use pam_data::statistics::NORMAL_95;
 use pam_fit::table_root;
 
 /// Places along the pressure axis.
@@ -36,7 +36,7 @@ fn over_pressure(view: &View<'_>) -> Figure {
         let values: Vec<f64> = curves.iter().map(|c| take(c) * scale).collect();
         let std: Vec<f64> = (0..PLACES).map(|i| root.std(1 + k * PLACES + i) * scale).collect();
         let edge = |sign: f64| -> Vec<f64> {
-            values.iter().zip(&std).map(|(v, s)| v + sign * HALF_95 * s).collect()
+            values.iter().zip(&std).map(|(v, s)| v + sign * NORMAL_95 * s).collect()
         };
         let ring: Vec<f64> = at_nodes.iter().map(|c| take(c) * scale).collect();
         Panel::new(axis(), y)
@@ -98,7 +98,7 @@ fn stress(view: &View<'_>) -> Figure {
             for (k, g) in gradient[1..=order].iter_mut().enumerate() {
                 *g = strain.powi(k as i32 + 1);
             }
-            HALF_95 * root.variance(&gradient).sqrt() * 1e-6
+            NORMAL_95 * root.variance(&gradient).sqrt() * 1e-6
         };
         let stress = |strain: f64| moduli.iter().rev().fold(0.0, |sum, e| strain * (sum + e)) * 1e-6;
         let postures: Vec<_> = view
@@ -149,7 +149,7 @@ fn stress(view: &View<'_>) -> Figure {
 
 /// A value with half the width of its 95 % interval; the interval has two figures, the value as many decimals.
 pub(super) fn with_interval(value: f64, std: f64) -> String {
-    let half = 1.96 * std;
+    let half = NORMAL_95 * std;
     if !(half > 0.0 && half.is_finite()) {
         return significant(value, 3);
     }

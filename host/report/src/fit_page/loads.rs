@@ -4,6 +4,7 @@ use super::super::{Axis, Colour, Figure, Mark, Panel, Section, fixed};
 use super::held_length;
 use super::view::{Banded, View};
 use pam_data::pluralise::pluralise;
+use pam_data::statistics::NORMAL_95;
 use pam_fit::columns;
 
 /// At most this many small panels: more cannot be compared by eye.
@@ -252,7 +253,7 @@ fn ends(view: &View<'_>) -> Figure {
 fn deadband(view: &View<'_>) -> Figure {
     let s = &view.fit.summary;
     let area = columns(&view.fit.solution.problem.braid, 0.0).area;
-    let (p0, half) = (s.deadband_kPa, 1.96 * s.deadband_std_kPa);
+    let (p0, half) = (s.deadband_kPa, NORMAL_95 * s.deadband_std_kPa);
     let top = view.levels.last().map_or(1.0, |p| p / 1e3);
     let (x, y): (Vec<f64>, Vec<f64>) = if view.held_length() {
         held_length::at_rest_length(view)

@@ -3,6 +3,7 @@
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, Tone, fixed, significant};
 use super::curves::with_interval;
 use super::view::View;
+use pam_data::statistics::NORMAL_95;
 
 pub(super) fn section(view: &View<'_>) -> Section {
     let mut section = Section::new("Parameters").summarised();
@@ -25,7 +26,7 @@ pub(super) fn section(view: &View<'_>) -> Section {
         let mut row = vec![fixed(p.pressure_kPa, 0)];
         for (value, std) in p.E_MPa.iter().zip(&p.E_std_MPa) {
             let mut cell = with_interval(*value, *std);
-            if !(value.abs() > 1.96 * std) {
+            if !(value.abs() > NORMAL_95 * std) {
                 cell += " (n. i.)";
             }
             row.push(cell);

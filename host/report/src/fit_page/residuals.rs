@@ -2,6 +2,7 @@
 
 use super::super::{Axis, Colour, Figure, Mark, Panel, Section, Table, fixed, residual_table};
 use super::view::View;
+use pam_data::statistics::NORMAL_95;
 use pam_data::statistics::extremes;
 
 pub(super) fn section(view: &View<'_>) -> Section {
@@ -150,7 +151,7 @@ fn memory(view: &View<'_>) -> Figure {
     let used: Vec<usize> = (0..points.len()).filter(|i| view.fitted(*i)).collect();
     let values = &view.fit.uncertain.autocorrelation;
     let lags: Vec<f64> = (0..values.len()).map(|l| l as f64).collect();
-    let bound = 1.96 / (used.len().max(1) as f64).sqrt();
+    let bound = NORMAL_95 / (used.len().max(1) as f64).sqrt();
     let correlation = view.fit.uncertain.correlation;
     let panel =
         Panel::new(Axis::new("lag in points", ""), Axis::new("autocorrelation", "").range(-1.0, 1.05))

@@ -5,10 +5,11 @@ use pam_data::statistics::extremes;
 
 use super::super::{Colour, fixed, significant};
 use pam_data::recording::Campaign;
+use pam_data::statistics::NORMAL_95;
 use pam_fit::Fit;
 use pam_fit::Point;
 use pam_fit::PointUse;
-use pam_fit::confidence_band::{ConfidenceBand, HALF_95};
+use pam_fit::confidence_band::ConfidenceBand;
 use pam_fit::table_file::{About, TableFile};
 
 /// A fit, ready to be drawn.
@@ -182,13 +183,13 @@ impl<'a> View<'a> {
     /// The same at one pressure and one stroke: force, lower and upper edge.
     pub fn banded_at(&self, pressure: f64, stroke: f64, direction: f64) -> [f64; 3] {
         let force = self.force(pressure, stroke, direction);
-        let half = self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.std(pressure, stroke, direction));
+        let half = self.band.as_ref().map_or(f64::NAN, |b| NORMAL_95 * b.std(pressure, stroke, direction));
         [force, force - half, force + half]
     }
 
     /// Half the width of the 95 % interval of single readings, N.
     pub fn half_of_readings(&self, pressure: f64, stroke: f64, direction: f64) -> f64 {
-        self.band.as_ref().map_or(f64::NAN, |b| HALF_95 * b.reading_std(pressure, stroke, direction))
+        self.band.as_ref().map_or(f64::NAN, |b| NORMAL_95 * b.reading_std(pressure, stroke, direction))
     }
 
     /// Description of where the largest error is.

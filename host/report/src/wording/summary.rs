@@ -2,13 +2,14 @@
 
 use std::fmt::Write;
 
+use pam_data::statistics::NORMAL_95;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict};
 use pam_diagnose::why::Why;
 
 use super::{
-    HALF_95, HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split,
-    why, with_interval,
+    HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split, why,
+    with_interval,
 };
 use crate::effect_page::place;
 
@@ -176,7 +177,7 @@ fn effect(s: &mut String, m: &Missing) {
 #[must_use]
 pub fn traded_off(m: &Missing) -> Option<&'static str> {
     let includes_zero =
-        |p: &ParameterValue| p.value != 0.0 && p.std.is_some_and(|s| HALF_95 * s >= p.value.abs());
+        |p: &ParameterValue| p.value != 0.0 && p.std.is_some_and(|s| NORMAL_95 * s >= p.value.abs());
     let by_slack = matches!(m.why, Why::SlackReading { .. });
     let tested = !m.given && !m.checked && !by_slack && !is_from_history(m);
     (tested && m.parameters.iter().any(includes_zero)).then_some(

@@ -8,7 +8,7 @@ use pam_diagnose::timeline::course::{Change, Course, How};
 use pam_diagnose::timeline::series::{Point, Quantity, Series, What};
 use pam_diagnose::timeline::{Timeline, Visit};
 
-pub use super::HALF_95;
+use pam_data::statistics::NORMAL_95;
 
 /// Where a date is from, as in the JSON.
 #[must_use]
@@ -94,7 +94,7 @@ fn with_interval(value: f64, half: Option<f64>, unit: &str) -> String {
 /// A point in the usual unit.
 #[must_use]
 pub fn point(p: &Point, unit: &str) -> String {
-    with_interval(p.value, p.std.map(|s| HALF_95 * s), unit)
+    with_interval(p.value, p.std.map(|s| NORMAL_95 * s), unit)
 }
 
 /// Every change with its series, by date.
@@ -121,7 +121,7 @@ pub fn change(visits: &[Visit], series: &Series, change: &Change) -> String {
     format!(
         "{} changed by {}, {when}; probability {:.2}",
         name(&series.what),
-        with_interval(change.size, Some(HALF_95 * change.std), &series.unit),
+        with_interval(change.size, Some(NORMAL_95 * change.std), &series.unit),
         change.probability
     )
 }

@@ -1,6 +1,6 @@
 //! A value with its interval.
 
-use super::HALF_95;
+use pam_data::statistics::NORMAL_95;
 
 /// A value with its 95 % confidence interval to two digits: `0.924 ± 0.024 N (95 %)`, `(4.59 ± 0.28)·10^-4 m (95 %)`.
 #[must_use]
@@ -11,7 +11,7 @@ pub fn with_interval(value: f64, std: Option<f64>, unit: &str) -> String {
     }
     let exponent = if (1e-2..1e5).contains(&value.abs()) { 0 } else { value.abs().log10().floor() as i32 };
     let scale = 10.0_f64.powi(exponent);
-    let known = std.filter(|s| *s > 0.0).map(|s| s * HALF_95);
+    let known = std.filter(|s| *s > 0.0).map(|s| s * NORMAL_95);
     let body = match known {
         Some(half) => {
             let digits = (1.0 - (half / scale).log10().floor()).clamp(0.0, 5.0) as usize;

@@ -18,7 +18,7 @@ pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &
     let protocol = set.protocol.as_ref().map_or(String::new(), |p| format!(" --protocol {p}"));
     let mut m = format!(
         "# Sensitivity of the diagnosis to its criteria\n\n\
-         Each criterion of `host/diagnose/src/criteria` at half and at double its value, on the same trials of a development set of the \
+         Each [criterion](criteria.md) at half and at double its value, on the same trials of a development set of the \
          virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and more whose first name is of the right class. \
          \"Answers changed\" counts trials that name something else than with the criteria as they are.\n\n\
          ```text\n\

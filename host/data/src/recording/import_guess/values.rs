@@ -5,6 +5,7 @@ use super::sample::SampleColumn;
 use crate::recording::Quantity;
 use crate::short_number::short;
 use crate::statistics::extremes;
+use crate::statistics::median;
 
 /// Gauge pressures of pneumatic muscles, Pa: from the threshold of a thin bladder to the compressed air of a building.
 pub(super) const PRESSURES: (f64, f64) = (100e3, 1e6);
@@ -70,11 +71,7 @@ pub(super) fn is_constant(column: &SampleColumn) -> bool {
 pub(super) fn interval(column: &SampleColumn) -> Option<f64> {
     let mut steps: Vec<f64> =
         column.numbers.windows(2).map(|w| w[1] - w[0]).filter(|s| s.is_finite() && *s > 0.0).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() {
-        return None;
-    }
-    Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    (!steps.is_empty()).then(|| median(&mut steps))
 }
 
 /// Whether the values increase from row to row except for at most one step in twenty, as time does that begins again with each run.

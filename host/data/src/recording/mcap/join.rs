@@ -11,6 +11,7 @@ use crate::error::{DataCode, Error, Result};
 use crate::recording::column_table::{Column, ColumnTable};
 use crate::recording::import_guess::is_reading_of;
 use crate::recording::quantity::Quantity;
+use crate::statistics::integer_median;
 
 /// A topic pauses where no message comes for this many of its usual intervals: single lost messages are none, a driver that was
 /// restarted is one.
@@ -50,8 +51,7 @@ impl<'a> Series<'a> {
     /// The usual interval between its messages, ns.
     fn interval(&self) -> u64 {
         let mut steps: Vec<u64> = self.order.windows(2).map(|w| w[1].0 - w[0].0).collect();
-        let middle = steps.len() / 2;
-        if steps.is_empty() { 0 } else { *steps.select_nth_unstable(middle).1 }
+        integer_median(&mut steps)
     }
 
     /// A field at these times, which increase.

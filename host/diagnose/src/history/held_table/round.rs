@@ -3,8 +3,8 @@
 use pam_fit::numerics::symmetric::{Symmetric, dot};
 
 use super::super::criteria::{
-    HELD_BOUND_ROUNDS, HELD_FLATNESS, HELD_FOLDS, HELD_GAMMA_ERROR, HELD_NEXT_COEFFICIENT, HELD_RESIDUAL,
-    HELD_SMOOTHNESS,
+    HELD_BOUND_ROUNDS, HELD_DEADBAND, HELD_DEADBAND_ERROR, HELD_FLATNESS, HELD_FOLDS, HELD_GAMMA_ERROR,
+    HELD_NEXT_COEFFICIENT, HELD_RESIDUAL, HELD_SMOOTHNESS,
 };
 use super::{AT, Open, Problem, Solution};
 
@@ -123,7 +123,7 @@ impl<'a> Round<'a> {
         }
         prior(AT.gamma, 1.0, HELD_GAMMA_ERROR);
         let high = problem.points.highest() * 1e3;
-        prior(AT.deadband, 0.1 * high, high);
+        prior(AT.deadband, HELD_DEADBAND * high, HELD_DEADBAND_ERROR * high);
         (matrix, moment)
     }
 

@@ -11,6 +11,7 @@ use super::super::answer::{
 use super::super::criteria::{
     CATALOGUE_BINS, CATALOGUE_LAW_ERROR, CATALOGUE_USUAL, COURSE_LEAD, LOCALISE_STANDS_OUT, NAMED, SET, SIZES,
 };
+use super::super::detectable;
 use super::super::held_out::{Unseen, parts, shown};
 use super::super::report::left;
 use super::super::shapes::Change;
@@ -262,8 +263,7 @@ fn not_comparable(cells: &Cells) -> Vec<NotComparable> {
 fn considered(weighed: &Weighed, prior: f64) -> Vec<Considered> {
     let open = |f: &&Fit| !weighed.accepted.iter().any(|a| a.fit.change == f.change);
     let p_of = |name: &str| weighed.probabilities.iter().find(|(n, _)| n == name).map_or(0.0, |(_, p)| *p);
-    let share = ((1.0 - prior) / weighed.alone.len().max(1) as f64).max(1e-6);
-    let z = (2.0 * (prior / share).ln() + 6.0).max(0.0).sqrt() + 1.28;
+    let required = detectable::required(detectable::odds(prior, weighed.alone.len()), 0.0);
     let one = |f: &Fit| {
         let p = p_of(f.change.name());
         let (_, unit, _, std) = f.parameters.first().copied().unwrap_or(("", "", 0.0, 0.0));
@@ -271,7 +271,7 @@ fn considered(weighed: &Weighed, prior: f64) -> Vec<Considered> {
             effect: f.change.name().into(),
             gain: p,
             why_not: WhyNot::of(true, p),
-            detectable: Some(std * z).filter(|d| *d > 0.0 && d.is_finite()),
+            detectable: Some(detectable::size(std, required)).filter(|d| *d > 0.0 && d.is_finite()),
             unit: unit.into(),
         }
     };

@@ -1,13 +1,14 @@
 //! Both campaigns as cells: what AFTER differs by from BEFORE at the same level, place, direction and speed.
 
+use pam_data::statistics::{deviation_from_median, median};
 use std::collections::BTreeMap;
 
 use model_core::braid::Braid;
 use nalgebra::DVector;
 
 use super::super::criteria::{
-    CATALOGUE_BINS, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
-    CATALOGUE_SPEED_STEP,
+    CATALOGUE_BINS, CATALOGUE_CLIP, CATALOGUE_FEWEST_CELLS, CATALOGUE_FLOOR, CATALOGUE_PRIOR, CATALOGUE_REST,
+    CATALOGUE_SLOWEST, CATALOGUE_SPEED_STEP,
 };
 use super::rests;
 use crate::baselines::{self, Kind};
@@ -91,8 +92,7 @@ impl States {
                 speeds.push(context.speed.abs());
             }
         }
-        speeds.sort_by(f64::total_cmp);
-        let speed = speeds.get(speeds.len() / 2).copied().unwrap_or(1.0);
+        let speed = if speeds.is_empty() { 1.0 } else { median(&mut speeds) };
         Self { ends, speed }
     }
 
@@ -109,7 +109,7 @@ impl States {
             // Rests by decade of their duration.
             REST + (rows.still[i] / CATALOGUE_REST).max(1.0).log10().floor() as i32
         } else {
-            let ratio = (context.speed.abs() / self.speed).max(1e-3);
+            let ratio = (context.speed.abs() / self.speed).max(CATALOGUE_SLOWEST);
             (ratio.ln() / CATALOGUE_SPEED_STEP.ln()).round() as i32
         };
         (level, rows.sign[i] > 0.0, bin, kind)
@@ -143,9 +143,9 @@ struct Level {
 /// A variance in which single cells, as after a restart, do not count with all they have.
 fn robust(deviations: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let usual = 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
-    let square: f64 = deviations.iter().map(|d| d.clamp(-4.0 * usual, 4.0 * usual).powi(2)).sum();
+    let usual = deviation_from_median(median(&mut sizes));
+    let square: f64 =
+        deviations.iter().map(|d| d.clamp(-CATALOGUE_CLIP * usual, CATALOGUE_CLIP * usual).powi(2)).sum();
     square / deviations.len().max(1) as f64
 }
 

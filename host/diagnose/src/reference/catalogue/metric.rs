@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::super::criteria::{CATALOGUE_LAW_ERROR, CATALOGUE_USUAL};
+use super::super::criteria::{CATALOGUE_LAW_ERROR, CATALOGUE_TAKEN, CATALOGUE_USUAL};
 use super::cells::Cells;
 
 /// The metric of the cells: the inverse of `D + GS²G' + ZZ'`, freed of what was named before. `D` is the cells' own variance; `G` gives
@@ -112,7 +112,7 @@ pub(super) fn usual(cells: &Cells, taken: &[DVector<f64>]) -> Vec<DVector<f64>> 
         (peak > 0.0 && peak.is_finite()).then(|| column * (size / peak))
     };
     columns.extend(whole.iter().filter_map(|c| scaled(c, unit)));
-    columns.extend(taken.iter().filter_map(|c| scaled(c, 30.0 * cells.largest)));
+    columns.extend(taken.iter().filter_map(|c| scaled(c, CATALOGUE_TAKEN * cells.largest)));
     columns
 }
 

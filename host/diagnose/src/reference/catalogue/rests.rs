@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::super::criteria::{CATALOGUE_SLIP, CATALOGUE_SLIP_SPREADS};
 use super::cells::{Cell, REST, VENTED};
 use crate::rows::Rows;
-use pam_fit::numerics::median;
+use pam_data::statistics::{deviation_from_median, median};
 
 /// Rows at rest whose direction the pressure has turned since the muscle moved. The drift of a regulator turns it by chance, in one campaign and
 /// not in the other, while friction does not follow before the pressure has driven the braid through twice its friction.
@@ -73,7 +73,8 @@ pub(super) fn slipped(cells: &[Cell], difference: &[f64], variance: &[f64], half
     let shares: Vec<(usize, f64)> =
         (0..cells.len()).filter(|i| is_rest(&cells[*i])).filter_map(own).collect();
     let middle = median(&mut shares.iter().map(|s| s.1).collect::<Vec<f64>>());
-    let spread = 1.4826 * median(&mut shares.iter().map(|s| (s.1 - middle).abs()).collect::<Vec<f64>>());
+    let mut sizes: Vec<f64> = shares.iter().map(|s| (s.1 - middle).abs()).collect();
+    let spread = deviation_from_median(median(&mut sizes));
     let limit = (CATALOGUE_SLIP_SPREADS * spread).max(CATALOGUE_SLIP);
     let outside: Vec<usize> =
         shares.iter().filter(|s| (s.1 - middle).abs() > limit).map(|s| cells[s.0].rest).collect();

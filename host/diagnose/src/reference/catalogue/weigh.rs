@@ -6,8 +6,9 @@ use rayon::prelude::*;
 
 use super::super::contrast::{log_mean, log_sum};
 use super::super::criteria::{
-    CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_LAW_ERRORS, CATALOGUE_REFINED, CATALOGUE_USUAL,
-    MOST_CHANGES, NAMED, PRIOR_UNKNOWN, SIZES,
+    CATALOGUE_COMPETITOR, CATALOGUE_INDEPENDENT, CATALOGUE_LAW_ERROR, CATALOGUE_LAW_ERRORS,
+    CATALOGUE_LEAST_PRIOR, CATALOGUE_REFINED, CATALOGUE_STEP, CATALOGUE_USUAL, MOST_CHANGES, NAMED,
+    PRIOR_UNKNOWN, SIZES,
 };
 use super::super::shapes::{Change, Class};
 use super::cells::Cells;
@@ -144,7 +145,7 @@ fn scan(cells: &Cells, metric: &Metric<'_>, candidate: &Candidate) -> Option<(Fi
     let logs: Vec<f64> = fits.iter().map(|f| f.log).collect();
     let mean = log_sum(&logs) - ((grid.len() * laws.len()).max(1) as f64).ln();
     let mut best = fits.into_iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
-    let (coarse, mut step) = (best.log, 0.06);
+    let (coarse, mut step) = (best.log, CATALOGUE_STEP);
     for _ in 0..CATALOGUE_REFINED {
         let near = candidate.neighbours(&best.shapes, step);
         let law = |shapes: &Vec<f64>| {
@@ -231,7 +232,7 @@ impl Round {
         let free =
             SIZES.map(|s| Metric::of(cells, &columns, &beyond(s * cells.largest)).density - still.density);
         let unknown = tempered(&free);
-        let share = (1.0 - none - PRIOR_UNKNOWN).max(1e-3) / fits.len().max(1) as f64;
+        let share = (1.0 - none - PRIOR_UNKNOWN).max(CATALOGUE_LEAST_PRIOR) / fits.len().max(1) as f64;
         let logs: Vec<f64> = [none.ln(), PRIOR_UNKNOWN.ln() + unknown]
             .into_iter()
             .chain(fits.iter().map(|f| share.ln() + f.log))
@@ -264,7 +265,7 @@ impl Round {
         let (fit, probability) = &self.fits[chosen];
         let mut order: Vec<&(Fit, f64)> = self.fits.iter().collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let others = order.into_iter().filter(|(f, p)| f.change != fit.change && *p >= 0.02);
+        let others = order.into_iter().filter(|(f, p)| f.change != fit.change && *p >= CATALOGUE_COMPETITOR);
         Some(Accepted {
             fit: fit.clone(),
             probability: *probability,

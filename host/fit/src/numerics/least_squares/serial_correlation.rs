@@ -5,6 +5,7 @@
 //! (F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110, doi 10.2307/3002019).
 
 use nalgebra::{DMatrix, DVector};
+use pam_data::statistics::median;
 
 /// Rows from which τ is estimated, at most; more are thinned out.
 const ROWS: usize = 1500;
@@ -81,8 +82,7 @@ fn correlation_time(residual: &[f64], time: &[f64]) -> Option<f64> {
     let rows: Vec<(f64, f64)> = time.iter().zip(residual).step_by(stride).map(|(t, e)| (*t, *e)).collect();
     let span = rows.last()?.0 - rows.first()?.0;
     let mut steps: Vec<f64> = rows.windows(2).map(|w| w[1].0 - w[0].0).collect();
-    steps.sort_by(f64::total_cmp);
-    let step = *steps.get(steps.len() / 2)?;
+    let step = median(&mut steps);
     if !(step > 0.0 && span > 0.0) {
         return None;
     }
