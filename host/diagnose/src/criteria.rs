@@ -21,7 +21,7 @@
 //! | highest correlation of neighbours | `reference::LAG_CORRELATION`, `table_health::HEALTH_CORRELATION` 0.99, `reference::CATALOGUE_CORRELATED` 0.97 | of series of hundreds, and of some ten states |
 //! | probability of a name that is listed | `reference::CATALOGUE_COMPETITOR` 0.02, `reference::POSSIBLE` 0.05, `selection::CONFUSABLE` 0.1, `selection::REPORTED_COMPETITOR` 0.15 | forty effects share what four changes have; weights within one selection are no probabilities |
 //! | prior probability of no change | `reference::PRIOR_NONE`, `timeline::COURSE_PRIOR_NONE` 0.8, `reference::STROKE_PRIOR_NONE` 0.5 | nothing of the spread between campaigns of strokes is learned, so the prior claims nothing |
-//! | turn of a pressure or stroke, share of its range | `history::STAIRCASE_TURN` 0.04, `reference::TURN` 0.05, `COMBINED_TURNED` 0.1, `rows::TURNED_BACK` 0.25 | above the ripple of a regulator, ringing valves, friction that turns slowly, and of the least motion instead of the range |
+//! | turn of a pressure or stroke, share of its range | `history::STAIRCASE_TURN` 0.04, `TURN` of the motion 0.05, `COMBINED_TURNED` 0.1, `rows::TURNED_BACK` 0.25 | above the ripple of a regulator, ringing valves, friction that turns slowly, and of the least motion instead of the range |
 //! | where an actuator pulls, share of a largest value | `history::PULLS` 0.0125, `stock::ONSET` 0.02, `reference::COMBINED_PULLS` 0.05, `timeline::THRESHOLD_SHARE` 0.1 | a load cell's offset, its zero, a table's fitted range, and a crossing that must be sharp |
 //! | half-width of an interval of 95 % | `uncertainty::SIZE_ERRORS`, `RANGE_ERRORS` 1.96 | each decides on its own; both are `pam_data::statistics::NORMAL_95` |
 //!

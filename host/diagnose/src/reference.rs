@@ -60,7 +60,6 @@ mod interpolate;
 mod isometric;
 mod lag;
 mod localise;
-mod motion;
 mod naming;
 mod pairs;
 mod posterior;

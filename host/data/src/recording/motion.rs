@@ -12,6 +12,7 @@
 //! | `holding` | where the length is held |
 //! | `columns` | travel and time since a reversal, time at rest, cycles |
 //! | `state` | what each sample shows: held, in doubt, on a ramp |
+//! | `settled` | rows at which the pressure rests, and the way from one to the next |
 //! | `rates` | speed, acceleration, pressure rate |
 //!
 //! The direction of friction is the sign of the speed while the muscle moves. While its length is held, it is the way the pressure
@@ -24,12 +25,14 @@ mod holding;
 mod rates;
 mod reversals;
 mod scale;
+mod settled;
 mod state;
 mod turning;
 
 pub use columns::MotionColumns;
 pub use holding::Hold;
 pub use rates::Rates;
+pub use settled::{at_rest, fast_step, settled, settled_way, turn, way};
 pub use state::MotionState;
 
 use super::campaign::{Campaign, Clock};

@@ -210,7 +210,7 @@ pam_data::criteria! {
     LENGTH_ERROR: f64 = 1e-3, "delta_L", "m", Derived("a tape measure; the bound of a fit of lengths");
     /// Lengths that such a search tries over this range, to both sides.
     LENGTH_STEPS: usize = 17, "n_L", "1", Cost;
-    /// Runs that are predicted from the others by tables: of more, every so many-th is left out together.
+    /// Runs that are predicted from the others by tables: of more, every n-th is left out together.
     TABLE_FOLDS: usize = 12, "n_fold,T", "1", Cost;
     /// Single time constants that the spectrum is tried against.
     MEMORY_SINGLE_TIMES: ([f64; 2]) = [30.0, 300.0], "tau_1", "s", Judgement;

@@ -8,18 +8,6 @@ use crate::reference::stroked::StrokeRepeats;
 
 pam_data::criteria! {
     "Comparison with a reference":
-    /// A row is fast where the pressure moved by more than this share of its range within `FAST_WITHIN`. Ringing of valve pulses.
-    FAST_SHARE: f64 = 0.015, "ΔP_fast/ΔP", "1", Measured("ringing of valve pulses");
-    /// Time within which a fast row has moved.
-    FAST_WITHIN: f64 = 0.1, "t_fast", "s", Judgement;
-    /// Time since the last fast row until a row counts as settled: valve pulses ring at about 20 Hz for 0.2 to 0.3 s.
-    SETTLE: f64 = 0.25, "t_set", "s", Measured("ringing of valve pulses");
-    /// With a smaller share of settled rows all rows count as settled: the pressure never rests.
-    FEWEST_SETTLED: f64 = 0.1, "q_set", "1", Judgement;
-    /// Share of the range by which pressure or stroke must come back before it has turned: above ringing and ripple.
-    TURN: f64 = 0.05, "δ_turn", "1", Judgement;
-    /// The turn stands after the last row within this share of the range of the extremum, so that a hold keeps its direction.
-    TURN_HOLD: f64 = 0.01, "δ_hold", "1", Judgement;
     /// Pressure bins of a point: finer than any curve needs, coarser than rows.
     POINT_BINS: (usize) = 64, "n_pt", "1", Judgement;
     /// Intervals of the reference spline over the pressure range.
@@ -138,7 +126,7 @@ pam_data::criteria! {
     REMOUNT: f64 = 1e-3, "σ_x", "m", Convention("tape measure, 1 mm");
     /// Observations that the prior scale is worth.
     SCALE_PRIOR: f64 = 10.0, "ν_0", "1", Judgement;
-    /// Independent directions that a run can teach.
+    /// Independent directions that a run can determine.
     DIRECTIONS_PER_RUN: f64 = 4.0, "ν_run", "1", Judgement;
     /// Never believe that this actuator repeats more than √2 better than its class.
     LEAST_SCALE: f64 = 0.5, "s²_min", "1", Judgement;
@@ -187,7 +175,7 @@ pam_data::criteria! {
     COURSE_LEAD: f64 = 3.0, "ln B_course", "1", Convention("e^3 = 20");
     /// The stretch of likely starts of a change holds this probability.
     COURSE_INTERVAL: f64 = 0.95, "p_start", "1", Convention("95 %");
-    /// Pairs of changes that are weighed in full where one name leaves something, the likeliest first.
+    /// Pairs of changes that are tested in full where one name leaves something, the likeliest first.
     PAIRS_TRIED: usize = 3, "n_pairs", "1", Cost;
     /// Names in one answer, at most.
     MOST_CHANGES: usize = 3, "n_max", "1", Cost;
@@ -265,7 +253,7 @@ pam_data::criteria! {
     STROKE_PRIOR_NONE: f64 = 0.5, "p_none,x", "1", Judgement;
     /// Strokes without a name are unexplained where the probability of no change is below this.
     STROKE_UNEXPLAINED: f64 = 0.1, "p_none,x,min", "1", Convention("odds of 9 to 1 for some change");
-    /// Sets of changes of strokes that are weighed against each other: 0 zero and 1 gain of the force, 2 friction, 3 friction that grows with pressure.
+    /// Sets of changes of strokes that are compared with each other: 0 zero and 1 gain of the force, 2 friction, 3 friction that grows with pressure.
     STROKE_SETS: ([&[usize]; 9]) = [&[], &[0], &[1], &[2], &[3], &[2, 3], &[1, 2], &[1, 3], &[1, 2, 3]], "S", "1", Judgement;
     /// Log evidence that lies this much below none needs no gate.
     GATE_WORTH_ASKING: f64 = -1.0, "ln B_ask", "1", Judgement;

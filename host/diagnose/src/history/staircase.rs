@@ -6,8 +6,8 @@ use super::criteria::{
 use crate::criteria::valve_pulses::{WINDOW_FROM, WINDOW_TO};
 use crate::rest_friction::followed;
 use crate::valve_pulses::{self, ValvePulses};
-use pam_data::recording::Recording;
-use pam_data::statistics::{extremes, slope};
+use pam_data::recording::{Recording, motion};
+use pam_data::statistics::{range, slope};
 
 /// The mean of the last part of a pulse period.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,24 +155,9 @@ fn held_directions(stated: &[i8]) -> Vec<i8> {
 
 /// Direction of the drive at settled points, by the turns of their pressure: single rows would turn with each ring.
 fn turns(points: &mut [Point]) {
-    let range = extremes(points.iter().map(|p| p.pressure));
-    let turn = STAIRCASE_TURN * (range.1 - range.0);
-    let (mut extreme, mut now) = (0, 0_i8);
-    for i in 0..points.len() {
-        let moved = points[i].pressure - points[extreme].pressure;
-        let onward = moved * f64::from(now) >= 0.0 && now != 0;
-        if onward {
-            extreme = i;
-        } else if moved.abs() > turn {
-            let from = if now == 0 { 0 } else { extreme + 1 };
-            now = if moved > 0.0 { 1 } else { -1 };
-            points[from..i].iter_mut().for_each(|p| p.direction = now);
-            extreme = i;
-        }
-        points[i].direction = now;
-    }
-    // Nothing turned: it fills, or stays.
-    points.iter_mut().filter(|p| p.direction == 0).for_each(|p| p.direction = 1);
+    let pressure: Vec<f64> = points.iter().map(|p| p.pressure).collect();
+    let way = motion::way(&pressure, STAIRCASE_TURN * range(&pressure), 0.0);
+    points.iter_mut().zip(way).for_each(|(p, way)| p.direction = if way < 0.0 { -1 } else { 1 });
 }
 
 #[cfg(test)]

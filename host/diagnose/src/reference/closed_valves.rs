@@ -14,14 +14,14 @@
 use super::answer::{ChangeReport, Changed, Considered, Probability, Since, Verdict, WhyNot, size};
 use super::contrast::{log_mean, student};
 use super::criteria::{
-    CATALOGUE_LAW_ERROR, FAST_SHARE, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP,
-    LOSS_CLIP, LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_REWEIGHTED, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST,
-    LOSS_SIZES, LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
+    CATALOGUE_LAW_ERROR, LOSS_AFTER, LOSS_ALIKE_PRESSURE, LOSS_ALIKE_SHARE, LOSS_ALIKE_STEP, LOSS_CLIP,
+    LOSS_FLOOR, LOSS_PRESSURE, LOSS_RESTS, LOSS_REWEIGHTED, LOSS_ROWS, LOSS_RUNS, LOSS_SHORTEST, LOSS_SIZES,
+    LOSS_SPREAD, NAMED, PRIOR_UNKNOWN, SET,
 };
 use super::detectable;
-use super::motion;
 use super::runs::{Run, Runs};
 use super::shapes::{CHANGES, Change};
+use pam_data::recording::motion;
 use pam_data::statistics::{deviation_from_median, median};
 use pam_fit::bench::Candidate;
 
@@ -78,7 +78,7 @@ fn rests(run: &Run) -> Vec<Rest> {
         };
         let step = pressure[0] - before;
         // Without a step before it, several pulses are one rest: the supply replaces what is lost.
-        if step.abs() > FAST_SHARE * range {
+        if step.abs() > motion::fast_step(range) {
             all.push(Rest { slope, pressure: p, step });
         }
     }

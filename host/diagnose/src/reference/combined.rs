@@ -12,13 +12,13 @@ use super::answer::NotComparable;
 use super::criteria::{
     BEYOND, COMBINED_BEYOND, COMBINED_FEWEST_ROWS, COMBINED_LENGTHS, COMBINED_PULLS, COMBINED_RIDGE,
     COMBINED_SMOOTH, COMBINED_SPANS, COMBINED_SWING, COMBINED_TURNED, COMBINED_TURNS, GRID, POINT_BINS,
-    STROKES_ENDS, TABLE_SURFACE_STEP, TURN,
+    STROKES_ENDS, TABLE_SURFACE_STEP,
 };
-use super::motion::turning;
 use super::runs::{Mounted, Run, Runs, mounted_anew};
 use super::strokes::ends;
 use super::surface::{Surface, bin};
 use pam_data::error::{DataCode, Error, Result};
+use pam_data::recording::motion;
 use pam_data::recording::{self, Campaign, Recording};
 use pam_fit::table_file::TableFile;
 
@@ -37,7 +37,8 @@ pub(super) fn swings(r: &Recording) -> bool {
     if !(steps < COMBINED_SMOOTH * variance) {
         return false;
     }
-    let turns = turning(&r.stroke, COMBINED_SWING * travel, 0.0).windows(2).filter(|w| w[0] != w[1]).count();
+    let turns =
+        motion::way(&r.stroke, COMBINED_SWING * travel, 0.0).windows(2).filter(|w| w[0] != w[1]).count();
     let (low, high) = extremes(&r.pressure);
     let mut at = vec![Vec::new(); COMBINED_LENGTHS];
     for (p, x) in r.pressure.iter().zip(&r.stroke) {
@@ -75,7 +76,8 @@ impl Plane {
         let mut bins = vec![[0.0; 4]; 2 * POINT_BINS * POINT_BINS];
         for r in &campaign.recordings {
             let force = r.require_force()?;
-            for (i, d) in turning(&r.stroke, TURN * range(&r.stroke), 0.0).into_iter().enumerate() {
+            for (i, d) in motion::way(&r.stroke, motion::turn(range(&r.stroke)), 0.0).into_iter().enumerate()
+            {
                 let at = bin(r.pressure[i], pressures.0, pressures.1, POINT_BINS) * POINT_BINS
                     + bin(r.stroke[i], strokes.0, strokes.1, POINT_BINS);
                 let sum = &mut bins[2 * at + usize::from(d < 0.0)];
@@ -215,7 +217,7 @@ fn middles(campaign: &Campaign) -> Vec<f64> {
 /// The direction of every row by the stroke, and whether the row is far enough from the last turn for friction to have turned, too.
 fn directions(stroke: &[f64]) -> (Vec<f64>, Vec<bool>) {
     let travel = range(stroke);
-    let direction = turning(stroke, TURN * travel, 0.0);
+    let direction = motion::way(stroke, motion::turn(travel), 0.0);
     let mut start = stroke.first().copied().unwrap_or(0.0);
     let mut turned = vec![false; stroke.len()];
     for i in 1..stroke.len() {

@@ -2,8 +2,8 @@
 
 use super::answer::NotComparable;
 use super::criteria::{INTERPOLATE_FROM, NEW_VISIT, PAUSE, SAME_STROKE};
-use super::motion;
 use pam_data::error::Result;
+use pam_data::recording::motion;
 use pam_data::recording::{Campaign, Clock, Recording};
 use pam_data::statistics::median;
 
@@ -161,7 +161,7 @@ impl Runs {
                 continue;
             };
             let settled = motion::settled(&recording.time, &recording.pressure);
-            let direction = motion::direction(&recording.pressure, &settled);
+            let direction = motion::settled_way(&recording.pressure, &settled);
             self.runs.push(Run {
                 name: recording.name.clone(),
                 after,

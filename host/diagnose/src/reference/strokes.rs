@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 
 use super::criteria::{
     LEVEL, STROKE_BINS, STROKE_ENDS, STROKE_SPEED, STROKE_SPEED_QUANTILE, STROKES_ENDS, STROKES_FEWEST_ROWS,
-    STROKES_RUN_IN, STROKES_SPEED_OVER, TURN,
+    STROKES_RUN_IN, STROKES_SPEED_OVER,
 };
-use super::motion::turning;
 use super::surface::bin;
 use pam_data::error::Result;
+use pam_data::recording::motion;
 use pam_data::recording::{Campaign, Recording};
 
 /// Means of one stroke in one part of it.
@@ -70,7 +70,7 @@ pub(super) fn unrest(recording: &Recording) -> f64 {
 
 /// Rows and mean pressure of every stroke.
 fn strokes(recording: &Recording) -> Vec<(std::ops::Range<usize>, f64, f64)> {
-    let direction = turning(&recording.stroke, TURN * range(&recording.stroke), 0.0);
+    let direction = motion::way(&recording.stroke, motion::turn(range(&recording.stroke)), 0.0);
     let mut all = Vec::new();
     let mut start = 0;
     for i in 1..=direction.len() {

@@ -165,7 +165,7 @@ fn effect(s: &mut String, m: &Missing) {
     }
     if m.correction {
         let remedy = if m.checked && m.share_explained == 0.0 {
-            "the recordings cannot be corrected for it, so mend the bench"
+            "the recordings cannot be corrected for it, so repair the bench"
         } else {
             "it corrects the data and is not sent to the controller"
         };

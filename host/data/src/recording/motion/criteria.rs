@@ -124,4 +124,16 @@ crate::criteria! {
     RAMP_SETTLES: f64 = 3.0, "t_ramp", "s", Judgement;
     /// A ramp continues while its rate exceeds this share of its mean rate since the reversal.
     RAMP_STEADY: f64 = 0.3, "r_ramp", "1", Judgement;
+    /// A row is fast where the pressure moved by more than this share of its range within `FAST_WITHIN`. Ringing of valve pulses.
+    FAST_SHARE: f64 = 0.015, "ΔP_fast/ΔP", "1", Measured("ringing of valve pulses");
+    /// Time within which a fast row has moved.
+    FAST_WITHIN: f64 = 0.1, "t_fast", "s", Judgement;
+    /// Time since the last fast row until a row counts as settled: valve pulses ring at about 20 Hz for 0.2 to 0.3 s.
+    SETTLE: f64 = 0.25, "t_set", "s", Measured("ringing of valve pulses");
+    /// With a smaller share of settled rows all rows count as settled: the pressure never rests.
+    FEWEST_SETTLED: f64 = 0.1, "q_set", "1", Judgement;
+    /// Share of the range by which pressure or stroke must come back before it has turned: above ringing and ripple.
+    TURN: f64 = 0.05, "δ_settled", "1", Judgement;
+    /// The turn stands after the last row within this share of the range of the extremum, so that a hold keeps its direction.
+    TURN_HOLD: f64 = 0.01, "δ_hold", "1", Judgement;
 }

@@ -1,21 +1,37 @@
-//! Settled rows of a run, and which way pressure or stroke moves.
+//! Settled rows of a run, and which way pressure or stroke moves from one of them to the next.
+//!
+//! Valve pulses ring, and single rows would turn with each ring: at held lengths the direction is that of the settled rows.
 
-use pam_data::statistics::range;
+use crate::statistics::range;
 use std::collections::VecDeque;
 
 use super::criteria::{FAST_SHARE, FAST_WITHIN, FEWEST_SETTLED, SETTLE, TURN, TURN_HOLD};
 
+/// The least fast move of a pressure with this range.
+#[must_use]
+pub fn fast_step(range: f64) -> f64 {
+    FAST_SHARE * range
+}
+
+/// By how much a column with this range must come back before it has turned.
+#[must_use]
+pub fn turn(range: f64) -> f64 {
+    TURN * range
+}
+
 /// Rows long enough after the last fast move of the pressure; all rows where too few are.
-pub(super) fn settled(time: &[f64], pressure: &[f64]) -> Vec<bool> {
+#[must_use]
+pub fn settled(time: &[f64], pressure: &[f64]) -> Vec<bool> {
     let settled = at_rest(time, pressure, SETTLE);
     let count = settled.iter().filter(|s| **s).count();
     if (count as f64) < FEWEST_SETTLED * time.len() as f64 { vec![true; time.len()] } else { settled }
 }
 
 /// Rows at least `since` s after the last fast move of the pressure.
-pub(super) fn at_rest(time: &[f64], pressure: &[f64], since: f64) -> Vec<bool> {
+#[must_use]
+pub fn at_rest(time: &[f64], pressure: &[f64], since: f64) -> Vec<bool> {
     let n = time.len();
-    let limit = FAST_SHARE * range(pressure);
+    let limit = fast_step(range(pressure));
     let mut settled = vec![true; n];
     let (mut high, mut low): (VecDeque<usize>, VecDeque<usize>) = (VecDeque::new(), VecDeque::new());
     let mut last = f64::NEG_INFINITY;
@@ -48,7 +64,8 @@ pub(super) fn at_rest(time: &[f64], pressure: &[f64], since: f64) -> Vec<bool> {
 }
 
 /// The sign of a signal's motion between its reversals: 1 or −1 for every value.
-pub(super) fn turning(values: &[f64], threshold: f64, hold: f64) -> Vec<f64> {
+#[must_use]
+pub fn way(values: &[f64], threshold: f64, hold: f64) -> Vec<f64> {
     let mut direction = vec![1.0; values.len()];
     let Some(first) = values.first() else { return direction };
     let (mut sign, mut start, mut high, mut low) = (0.0, 0, *first, *first);
@@ -76,11 +93,12 @@ pub(super) fn turning(values: &[f64], threshold: f64, hold: f64) -> Vec<f64> {
 }
 
 /// Direction of every row by the settled ones; a row in motion takes that of the next settled row, where the pulse leads.
-pub(super) fn direction(pressure: &[f64], settled: &[bool]) -> Vec<f64> {
+#[must_use]
+pub fn settled_way(pressure: &[f64], settled: &[bool]) -> Vec<f64> {
     let rows: Vec<usize> = (0..pressure.len()).filter(|i| settled[*i]).collect();
     let values: Vec<f64> = rows.iter().map(|i| pressure[*i]).collect();
     let span = range(&values);
-    let known = turning(&values, TURN * span, TURN_HOLD * span);
+    let known = way(&values, turn(span), TURN_HOLD * span);
     let mut all = vec![1.0; pressure.len()];
     let mut next = 0;
     for (i, d) in all.iter_mut().enumerate() {
@@ -99,7 +117,7 @@ mod tests {
     #[test]
     fn a_hold_keeps_its_direction_and_ripple_does_not_turn() {
         let values = [0.0, 50.0, 100.0, 99.5, 100.0, 99.2, 60.0, 20.0, 0.0, 0.4, 40.0, 90.0];
-        let d = turning(&values, 5.0, 1.0);
+        let d = way(&values, 5.0, 1.0);
         assert_eq!(d, [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0]);
     }
 
