@@ -2,7 +2,7 @@
 # Runs the tests, in one of three tiers:
 #
 #     bash tests/all.sh --quick    # format, language, unit tests of the libraries: up to 3 minutes on 2 cores after the first build
-#     bash tests/all.sh            # the whole suite: up to 25 minutes
+#     bash tests/all.sh            # the whole suite: about 20 minutes after the build of the tests, 35 with it
 #     bash tests/all.sh --long     # the whole suite, the long tests, and the coverage
 #
 #     --lint                       # with any tier: Clippy, documentation, licences of the dependencies
