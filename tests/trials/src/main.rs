@@ -6,6 +6,7 @@ mod binomial_interval;
 #[cfg(test)]
 mod book;
 mod campaign;
+mod comparison;
 mod festo;
 mod festo_comparison;
 mod festo_history;

@@ -1,6 +1,6 @@
 //! The report of a set as Markdown: the figures by protocol, tables by class and effect, and a list of every failure.
 
-use crate::baselines::{self, Line, Others};
+use crate::comparison::{self, Comparison};
 use crate::figures::{Figures, Scored, big_and_visible};
 use crate::limits::said;
 use crate::names::{CLASSES, class};
@@ -77,7 +77,7 @@ pub fn detection(all: &[Scored]) -> Vec<(f64, f64, Rate)> {
 }
 
 /// The report as Markdown.
-pub fn markdown(title: &str, all: &[Scored], baselines: &[Line], others: Option<&Others>) -> String {
+pub fn markdown(title: &str, all: &[Scored], comparison: &Comparison) -> String {
     let mut m = format!("# {title}\n\nWritten by `trials score`; nothing here is typed by hand.\n\n");
     let every: Vec<&Scored> = all.iter().collect();
     let mut columns = vec![("all", Figures::of(&every))];
@@ -107,7 +107,7 @@ pub fn markdown(title: &str, all: &[Scored], baselines: &[Line], others: Option<
     for (a, b, rate) in detection(all) {
         let _ = writeln!(m, "| {a} to {b} | {rate} |");
     }
-    baselines::write(&mut m, baselines, &columns[0].1, others);
+    comparison::write(&mut m, comparison, &columns[0].1);
     m.push_str("\n## Calibration: stated probability and frequency\n\n| mean stated probability | exact | right class | names |\n| --- | --- | --- | --- |\n");
     for (stated, exact, near, n) in &columns[0].1.reliability {
         let _ = writeln!(m, "| {stated:.2} | {exact:.2} | {near:.2} | {n} |");

@@ -2,7 +2,7 @@
 
 use crate::figures::{Figures, Scored};
 use crate::names::{SINGLES, class};
-use crate::{answer, baselines, fitted, ledger, locate, report, score, second_round};
+use crate::{answer, comparison, fitted, ledger, locate, report, score, second_round};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -34,7 +34,7 @@ pub fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<Scored>, Box
             }
         }
     }
-    let baselines = baselines::all(set, &truths, &scored);
+    let comparison = comparison::compare(set, &truths, &scored);
     let drawn = ledger.drawn.max(ledger.truths.len());
     let share = if truths.len() < drawn { format!(" (the first of {drawn} drawn)") } else { String::new() };
     let title = format!(
@@ -43,9 +43,8 @@ pub fn score(set: &Path, host: &Path, held_out: bool) -> Result<Vec<Scored>, Box
         truths.len(),
         ledger.tool
     );
-    let others = baselines::Others::read(set);
-    let mut text = report::markdown(&title, &scored, &baselines, others.as_ref());
-    if let Some((process, tool, n)) = others.as_ref().and_then(|o| o.gains(&scored)) {
+    let mut text = report::markdown(&title, &scored, &comparison);
+    if let Some((process, tool, n)) = comparison.others.as_ref().and_then(|o| o.gains(&scored)) {
         let at = text.find("\n## Calibration").unwrap_or(text.len());
         let line = format!(
             "\nMedian held-out gain on the {n} single effects where a gain was possible: a Gaussian process over pressure, contraction, \
