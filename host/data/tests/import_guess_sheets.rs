@@ -286,7 +286,7 @@ fn names_that_stand_again_in_the_middle_are_left_out() {
     for head in [HEADER, units, "Bench 3\ntime_s,pressure_kPa,displacement_mm,force_N\n"] {
         let (guess, read) = recordings(&format!("{head}{}{head}{}", run(0.0, 300.0), run(2.0, 300.0)));
         assert_eq!(lengths(&read), [80], "{head} {}", guess.description);
-        assert!(guess.checks.iter().any(|c| c.text().contains("again")), "{:?}", guess.checks);
+        assert!(guess.checks.iter().any(|c| c.text().contains("repeated")), "{:?}", guess.checks);
         let (guess, read) = recordings(&format!("{head}{}\n{head}{}", run(0.0, 300.0), run(0.0, 500.0)));
         assert_eq!(lengths(&read), [40, 40], "{head} {}", guess.description);
         same(&read[1], 500.0);

@@ -149,7 +149,7 @@ fn other_archives_are_distinguished() {
     let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     zip.start_file("a.csv", zip::write::SimpleFileOptions::default()).unwrap();
     let archive = zip.finish().unwrap().into_inner();
-    assert!(message("a.zip", &archive).contains("no Excel or OpenDocument workbook"));
+    assert!(message("a.zip", &archive).contains("not an Excel or OpenDocument workbook"));
     let mut old = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1".to_vec();
     old.resize(2048, 0);
     assert!(message("a.xls", &old).contains(".xls"));
