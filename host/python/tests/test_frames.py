@@ -48,7 +48,7 @@ def test_frames_of_every_kind_become_the_same_recording():
     (read,) = pam.from_frame(hole, missing="skip")
     assert len(read) == len(recording) - 1
     assert "no column" in str(refused(lambda: pam.from_frame({"time_s": [1.0]}))).lower()
-    assert "no data frame" in str(refused(lambda: pam.from_frame(3)))
+    assert "not a data frame" in str(refused(lambda: pam.from_frame(3)))
 
 
 def test_campaigns_go_out_and_come_back():

@@ -158,7 +158,7 @@ def test_what_is_wrong_is_said():
         assert "a recording, not a table" in str(refused(lambda: pam.Table.read(path)))
     two = np.zeros((20, 2))
     assert "2 dimensions" in str(refused(lambda: pam.Recording("two", two, time, time)))
-    assert "no array of numbers" in str(refused(lambda: pam.Recording("text", ["a", "b"], time, time)))
+    assert "not an array of numbers" in str(refused(lambda: pam.Recording("text", ["a", "b"], time, time)))
     muscle, campaign = everything()
     table = pam.fit(campaign, muscle).table
     assert "do not fit each other" in str(refused(lambda: table.force(np.zeros(3), np.zeros(4))))
