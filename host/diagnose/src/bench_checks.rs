@@ -64,12 +64,12 @@ impl Fault {
         let largest = peak(rows.contexts(), &measured.parameters);
         let delays = Law::Bench(measured.fault).traits().delays_reversals;
         // At a reversal even the least play delays the whole jump of friction; how much it may hide is counted where the muscle slides.
-        let sliding: Vec<Context<f64>> = if delays {
-            rows.contexts().iter().map(|c| Context { friction: 0.0, ..*c }).collect()
+        let sliding = if delays {
+            Cow::Owned(rows.contexts().iter().map(|c| Context { friction: 0.0, ..*c }).collect())
         } else {
-            Vec::new()
+            Cow::Borrowed(rows.contexts())
         };
-        let at_most = if delays { peak(&sliding, &further) } else { peak(rows.contexts(), &further) };
+        let at_most = peak(&sliding, &further);
         let stands = delays && measured.is_sure() && material(peak(&sliding, &measured.parameters));
         let finding = if !material(largest) || !(measured.is_sure() || measured.is_likely()) {
             Finding::Absent
