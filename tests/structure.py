@@ -14,6 +14,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+import crates
+
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs/src/structure.md"
 BEFORE = "3790793e^"
@@ -61,15 +63,11 @@ def functions(lines):
             yield match[2], end - at + 1
 
 
-def crates(tree):
-    """Folder of each crate that is not only a test."""
-    found = {}
-    for manifest in [*tree.glob("*/Cargo.toml"), *tree.glob("*/*/Cargo.toml")]:
-        parts = manifest.relative_to(tree).parts
-        name = re.search(r'^name = "([\w-]+)"', manifest.read_text(), re.M)
-        if name and not {"target", "fuzz"} & set(parts) and (parts[0] != "tests" or name[1] == "virtual-bench"):
-            found[name[1]] = manifest.parent
-    return found
+def folders_of(tree):
+    """Folder of each crate that is not only a test; the bench stood among the tests once."""
+    packages = crates.metadata(tree / "Cargo.toml") + crates.metadata(tree / "host/python/Cargo.toml")
+    found = {p["name"]: Path(p["manifest_path"]).parent for p in packages}
+    return {n: f for n, f in found.items() if f.relative_to(tree).parts[0] != "tests" or n == "virtual-bench"}
 
 
 def effects():
@@ -80,7 +78,7 @@ def effects():
 
 def counts(tree):
     """The figures of one tree."""
-    folders = crates(tree)
+    folders = folders_of(tree)
     code = {name: sources(folder / "src") for name, folder in folders.items()}
     everything = [(path, lines) for files in code.values() for path, lines in files.items()]
     diagnosis = code.get("pam-diagnose") or module(code["host"], "diagnose")

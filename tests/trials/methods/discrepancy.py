@@ -32,12 +32,16 @@ def evidence(columns):
             best = (risk, k, left)
     _, k, left = best
     noise = np.random.default_rng(1).standard_normal(4 * len(two)) * np.std(left)
-    synthetic = emd.make_empirical_risk_ppf(np.sort(noise**2))
+    return NAMES[k], less_risk(left, y[two], noise)
+
+
+def less_risk(left, other, noise):
+    """The probability that the model that leaves the first residual has less risk than the one that leaves the other."""
+    risk = lambda residual: emd.make_empirical_risk_ppf(np.sort(residual**2))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        p = emd.Bemd(emd.make_empirical_risk_ppf(np.sort(left**2)), emd.make_empirical_risk_ppf(np.sort(y[two] ** 2)), synthetic, synthetic,
-                     c=1.0, res=4, M=32, max_M=32, progbarA=None, progbarB=None, use_multiprocessing=False)
-    return NAMES[k], float(p)
+        return float(emd.Bemd(risk(left), risk(other), risk(noise), risk(noise), c=1.0, res=4, M=32, max_M=32, progbarA=None, progbarB=None,
+                              use_multiprocessing=False))
 
 
 def name(found, setting):
