@@ -30,6 +30,7 @@
 pub(crate) mod basis;
 pub(crate) mod by_recording;
 pub(crate) mod chunks;
+mod condensed;
 mod cross_validation;
 mod deadband;
 pub(crate) mod design;

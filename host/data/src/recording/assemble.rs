@@ -1,10 +1,12 @@
 //! From the columns of a file to recordings: filters, groups, stroke, and the checks that need whole columns.
 
+mod held_lengths;
 mod look_up;
 
 use std::collections::HashMap;
 use std::path::Path;
 
+use self::held_lengths::held_lengths;
 use super::blocks::Rows;
 use super::cells::Want;
 use super::column_plan::{ColumnPlan, Role};
@@ -85,6 +87,9 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
     {
         names.push("run".to_owned());
         table.splits.push(runs_of_clock(time));
+    }
+    if table.splits.is_empty() {
+        split_at_held_lengths(&mut table, &mut names, keep.as_deref(), job.plan.stroke);
     }
     let groups = groups(&table.splits, keep.as_deref(), rows.rows);
     let mut recordings = Vec::with_capacity(groups.len());
@@ -279,6 +284,49 @@ fn runs_of_clock(time: &[f64]) -> TextColumn {
         runs.push(&word);
     }
     runs
+}
+
+/// Splits a file that holds several lengths, one after another, where nothing else splits it.
+fn split_at_held_lengths(
+    table: &mut Table,
+    names: &mut Vec<String>,
+    keep: Option<&[bool]>,
+    stroke: Option<Quantity>,
+) {
+    let stroke = stroke.unwrap_or(Quantity::Displacement);
+    // Contractions have no unit: a stay has no length in mm before the rest length is known.
+    if !matches!(stroke, Quantity::Displacement | Quantity::Length) {
+        return;
+    }
+    let (Some(length), Some(pressure)) =
+        (table.quantities.get(&stroke), table.quantities.get(&Quantity::Pressure))
+    else {
+        return;
+    };
+    let columns = match keep {
+        None => held_lengths(length, pressure),
+        Some(keep) => {
+            let kept = |column: &[f64]| -> Vec<f64> {
+                column.iter().zip(keep).filter_map(|(v, k)| k.then_some(*v)).collect()
+            };
+            held_lengths(&kept(length), &kept(pressure)).map(|columns| columns.map(|c| spread(&c, keep)))
+        }
+    };
+    if let Some(columns) = columns {
+        names.extend([stroke.name().to_owned(), "run".to_owned()]);
+        table.splits.extend(columns);
+    }
+}
+
+/// A column of the kept rows as one of all rows.
+fn spread(kept: &TextColumn, keep: &[bool]) -> TextColumn {
+    let mut all = TextColumn::default();
+    let mut next = 0;
+    for k in keep {
+        all.push(if *k { kept.get(next) } else { "" });
+        next += usize::from(*k);
+    }
+    all
 }
 
 type Group = (Vec<String>, Option<Vec<u32>>);

@@ -1,7 +1,9 @@
 //! How noisy a column is, robustly, beside whatever motion it shows.
 
-use super::motion::criteria::{FOURTH_DIFFERENCES, NOISE_SAMPLES, QUANTISED_REPEATS, QUANTUM_SAMPLES};
-use crate::statistics::{deviation_from_median, median};
+use super::motion::criteria::{
+    FOURTH_DIFFERENCES, NOISE_SAMPLES, QUANTISED_CHANGES, QUANTISED_LEVELS, QUANTISED_REPEATS, QUANTUM_SAMPLES,
+};
+use crate::statistics::{deviation_from_median, median, range};
 
 /// Standard deviation of the white noise in a column: from second differences, whose variance is 6 σ² for white noise and
 /// which smooth motion hardly enters; their median is insensitive to reversals and jumps. Where the motion is sampled so
@@ -18,11 +20,17 @@ pub fn white_noise(column: &[f64]) -> f64 {
     second.min(spread_of(column.len() - 4, fourth) / 70f64.sqrt()).max(quantisation_noise(column))
 }
 
-/// The noise of a converter whose steps are so wide that many neighbours read the same; 0 for other columns.
+/// The noise of a converter whose steps are so wide that many neighbours read the same; 0 for other columns, and for those that hold
+/// a few values that were set.
 fn quantisation_noise(column: &[f64]) -> f64 {
     let some = &column[..column.len().min(QUANTUM_SAMPLES)];
     let equal = some.windows(2).filter(|w| w[0] == w[1]).count();
-    if equal * QUANTISED_REPEATS > some.len() { quantum(column) / 12f64.sqrt() } else { 0.0 }
+    if equal * QUANTISED_REPEATS <= some.len() {
+        return 0.0;
+    }
+    let step = quantum(some);
+    let changes_often = (some.len() - equal) * QUANTISED_CHANGES > some.len();
+    if changes_often || range(some) >= QUANTISED_LEVELS * step { step / 12f64.sqrt() } else { 0.0 }
 }
 
 /// As [`white_noise`], from second differences over `lag` samples.
@@ -66,5 +74,14 @@ mod tests {
         assert!((white_noise(&column) - 1.0 / 12f64.sqrt()).abs() < 1e-12);
         let fine: Vec<f64> = (0..4000).map(|i| 0.01 * f64::from(i)).collect();
         assert!(white_noise(&fine) < 1e-9);
+        // One step back and forth at rest.
+        let flicker: Vec<f64> = (0..4000).map(|i| f64::from(i * i % 7 / 4)).collect();
+        assert!(white_noise(&flicker) >= 1.0 / 12f64.sqrt(), "{}", white_noise(&flicker));
+    }
+
+    #[test]
+    fn set_lengths_have_no_noise() {
+        let lengths: Vec<f64> = (0..36_000).map(|i| 7.5e-3 * f64::from(i / 3000 % 4)).collect();
+        assert_eq!(white_noise(&lengths), 0.0);
     }
 }

@@ -9,6 +9,7 @@ use model_core::braid::Geometry;
 
 use super::Options;
 use super::basis::columns;
+use super::condensed::condense;
 use super::dimensions::{Mounting, Unknown, describe, moved};
 use super::points::{HeldMounting, Points};
 use super::problem::Problem;
@@ -94,6 +95,8 @@ struct Search<'a> {
     at: Vec<f64>,
     /// The ratio of the misfit to what the weights predict, at least 1.
     excess: f64,
+    /// The weighted sum of squares that no parameter changes.
+    within: f64,
 }
 
 /// How often the priors are compared again with the remaining misfit.
@@ -121,38 +124,76 @@ pub(super) fn adjust(
         return (problem.clone(), parameters);
     }
     let size = problem.design.layout().len();
-    let mut search = Search {
-        at: vec![0.0; count],
-        parameters: [parameters, vec![0.0; count]].concat(),
-        unknowns,
-        weights: &weights.values,
-        problem: problem.clone(),
-        excess: 1.0,
-    };
-    search.problem.design.extras = count;
-    search.problem.design.extra = vec![0.0; search.problem.design.rows.len() * count];
-    // With the dimensions free, trends of E_k with pressure are theirs to explain first.
-    search.problem.design.level = 0.03;
-    for pass in 0..PASSES {
-        let at = search.at.clone();
-        let misfit = search.solve_at(&at).misfit;
-        // Weights take the model for nearly exact. Where it is not, they overstate the information of the points by as much as the
-        // misfit exceeds what they predict, and the priors are scaled likewise.
-        let before = std::mem::replace(&mut search.excess, (misfit / weights.cells).max(1.0));
-        let excess = search.excess;
-        let design = &mut search.problem.design;
-        design.extra_prior = search.unknowns.list.iter().map(|u| excess * u.prior().0.powi(-2)).collect();
-        design.hold_deadband = excess * design.origin.max(1.0).powi(-2);
-        if pass > 0 && (excess / before - 1.0).abs() < 0.05 {
-            break;
+    // Runs that repeat at held lengths say it all in few points; the columns are computed for these again and again.
+    let condensed = condense(problem, &weights.values, &unknowns.mounting);
+    let found = match &condensed {
+        None => None,
+        Some(few) => {
+            let unknowns = Unknowns::of(&few.problem, options);
+            let mut search = Search::new(unknowns, &few.weights, few.problem.clone(), &parameters);
+            // What the points of a cell differ by is no part of the few points' misfit.
+            let all = problem.design.normal(&parameters, &weights.values).misfit;
+            search.within = all - few.problem.design.normal(&parameters, &few.weights).misfit;
+            search.find(weights.cells);
+            Some((search.at, search.parameters, search.excess))
         }
-        search.descend();
+    };
+    let mut search = Search::new(unknowns, &weights.values, problem.clone(), &parameters);
+    match found {
+        None => search.find(weights.cells),
+        Some((at, parameters, excess)) => {
+            (search.at, search.parameters) = (at, parameters);
+            search.scale_priors(excess);
+        }
     }
     search.linearise();
     search.finish(screen, size)
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// At the described dimensions, with a table's parameters.
+    fn new(unknowns: Unknowns, weights: &'a [f64], mut problem: Problem, parameters: &[f64]) -> Self {
+        let count = unknowns.list.len();
+        let design = &mut problem.design;
+        design.extras = count;
+        design.extra = vec![0.0; design.rows.len() * count];
+        // With the dimensions free, trends of E_k with pressure are theirs to explain first.
+        design.level = 0.03;
+        Self {
+            at: vec![0.0; count],
+            parameters: [parameters, &vec![0.0; count]].concat(),
+            unknowns,
+            weights,
+            problem,
+            excess: 1.0,
+            within: 0.0,
+        }
+    }
+
+    /// Finds the dimensions; `cells` is what the weights predict of the misfit.
+    fn find(&mut self, cells: f64) {
+        for pass in 0..PASSES {
+            let at = self.at.clone();
+            let misfit = self.solve_at(&at).misfit;
+            // Weights take the model for nearly exact. Where it is not, they overstate the information of the points by as much as the
+            // misfit exceeds what they predict, and the priors are scaled likewise.
+            let before = self.excess;
+            self.scale_priors((misfit / cells).max(1.0));
+            if pass > 0 && (self.excess / before - 1.0).abs() < 0.05 {
+                break;
+            }
+            self.descend();
+        }
+    }
+
+    /// Priors at an excess of the misfit.
+    fn scale_priors(&mut self, excess: f64) {
+        self.excess = excess;
+        let design = &mut self.problem.design;
+        design.extra_prior = self.unknowns.list.iter().map(|u| excess * u.prior().0.powi(-2)).collect();
+        design.hold_deadband = excess * design.origin.max(1.0).powi(-2);
+    }
+
     /// Gauss–Newton steps in the dimensions, each no longer than lowers the objective of a table solved again there: far from the
     /// solution the columns `∂F/∂p` hold over a part of a step only, and whole steps would oscillate.
     fn descend(&mut self) {
@@ -215,7 +256,8 @@ impl Search<'_> {
         let data = self.problem.design.normal(&self.parameters, self.weights);
         let penalty = self.problem.penalty(&data, Smoothing::START);
         let design = &self.problem.design;
-        let misfit = design.solve_from(data, &mut self.parameters, self.weights, &penalty, 6).misfit;
+        let misfit =
+            self.within + design.solve_from(data, &mut self.parameters, self.weights, &penalty, 6).misfit;
         let prior = self.unknowns.prior(at, self.excess);
         Solved { misfit, objective: misfit + penalty.quadratic(&self.parameters) + prior }
     }

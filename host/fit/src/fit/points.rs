@@ -143,6 +143,11 @@ impl Points {
         median(&mut self.list.iter().filter(|p| p.rows >= 4).map(deviation).collect::<Vec<_>>())
     }
 
+    /// All but the points.
+    pub(super) fn without_list(&self) -> Self {
+        Self { list: Vec::new(), mountings: self.mountings.clone(), ..*self }
+    }
+
     /// The mountings, where every recording was held at one length and there are at least two: isometric tests. Empty otherwise.
     #[must_use]
     pub fn held_lengths(&self) -> Vec<HeldMounting> {

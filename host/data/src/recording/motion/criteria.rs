@@ -4,6 +4,15 @@ crate::criteria! {
     "Motion: noise, reversals, holds and ramps":
     /// A series is quantised where more than one of this many successive readings are equal.
     QUANTISED_REPEATS: usize = 5, "1/q_equal", "1", Judgement;
+    /// Equal successive readings are steps of a converter where the range holds at least this many of its smallest step, or where
+    /// readings change often. Otherwise they are values that were set, for instance lengths of mountings.
+    QUANTISED_LEVELS: f64 = 32.0, "n_levels", "1", Judgement;
+    /// Readings change often where more than one of this many successive readings differ.
+    QUANTISED_CHANGES: usize = 20, "1/q_change", "1", Judgement;
+    /// Fewest rows of a stay at one length, where a file of an isometric test is split at its lengths.
+    STAY_ROWS: usize = 16, "N_stay", "1", Judgement;
+    /// The file is an isometric test where the pressure moves over at least this share of its range at the median stay.
+    STAY_SWEEP: f64 = 0.5, "ΔP_stay/ΔP", "1", Judgement;
     /// Samples behind an estimate of white noise, in runs of neighbours, about.
     NOISE_SAMPLES: usize = 16_384, "N_noise", "1", Cost;
     /// Samples among which the smallest step of a converter is looked for, at most.
