@@ -59,7 +59,7 @@ def held(rng, rows, levels):
     way = np.tile(np.repeat([1.0, -1.0], size // 2), -(-rows // size))[:rows]
     place = (np.arange(rows) // size) % 5
     x = 0.25 * place * muscle.stroke(muscle.LEVELS[2])
-    force = np.maximum(muscle.quasi(p, x), 0) * (1 + 0.05 * way)
+    force = np.maximum(muscle.quasi(p, x), 0) * (1 - 0.05 * way)
     return Made(muscle.columns(rng, 1e-3 * np.arange(rows), p, x, force))
 
 

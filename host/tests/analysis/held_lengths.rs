@@ -2,12 +2,13 @@
 
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
+use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
 use bench_campaign::{description, recordings};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::recording::Campaign;
+use pam_data::recording::{Campaign, Reader, Recording};
 use pam_fit::table_file::{About, TableFile};
 use pam_fit::{Options, fit};
 use virtual_bench::bench::{Bench, BenchSpec};
@@ -98,6 +99,67 @@ fn mountings_of_equal_length_are_separated_by_their_labels() {
     assert_eq!(fitted.solution.problem.mountings.len(), 6);
     assert_eq!(fitted.summary.recordings.len(), 6);
     assert_eq!(fitted.summary.recordings[4].recording, "second1, run 1");
+}
+
+/// Recordings as one file, one after another.
+fn one_file(path: &Path, recordings: &[Recording]) {
+    let mut text = String::from("time_s,pressure_kPa,displacement_mm,force_N\n");
+    let mut start = 0.0;
+    for r in recordings {
+        for (i, t) in r.time.iter().enumerate() {
+            let (p, x, f) = (r.pressure[i] / 1e3, r.stroke[i] * 1e3, r.require_force().unwrap()[i]);
+            writeln!(text, "{:.6},{p},{x},{f}", start + t - r.time[0]).unwrap();
+        }
+        start += r.duration() + 0.01;
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn one_file_of_several_lengths_gives_the_table_of_separate_files() {
+    let spec = presets::contractile();
+    let campaign = staircases(&spec, 1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("staircases.csv");
+    // The first length again at the end.
+    let mut visits = campaign.recordings.clone();
+    visits.push(visits[0].clone());
+    one_file(&path, &visits);
+    let read = Reader::new().campaign(&[path]).unwrap();
+    let titles: Vec<String> = read.recordings.iter().map(Recording::title).collect();
+    assert_eq!(titles.len(), 4, "{titles:?}");
+    assert!(titles[0].ends_with(" mm, run 1") && titles[3].ends_with(" mm, run 2"), "{titles:?}");
+    let muscle = description(&spec);
+    let [one, separate] = [read, Campaign::new(visits)].map(|c| fit(&c, &muscle, &Options::default()).unwrap());
+    let of = |f: &pam_fit::Fit| (f.summary.deadband_kPa, f.summary.rms_N);
+    let ((p, rms), (separate_p, separate_rms)) = (of(&one), of(&separate));
+    assert!((p - separate_p).abs() < 0.01, "{p} and {separate_p} kPa");
+    assert!((rms / separate_rms - 1.0).abs() < 0.01, "{rms} and {separate_rms} N");
+}
+
+/// Runs that repeat are condensed while dimensions are searched for.
+#[test]
+fn dimensions_from_runs_that_repeat_are_those_of_one_run() {
+    let spec = presets::contractile();
+    let campaign = staircases(&spec, 1);
+    let options = Options { fit_geometry: true, fit_lengths: true, ..Options::default() };
+    let [once, often] = [1, 12].map(|times| {
+        let mut all = Vec::new();
+        for run in 0..times {
+            for mut r in campaign.recordings.clone() {
+                r.labels = vec![("run".into(), run.to_string())];
+                r.time.iter_mut().for_each(|t| *t += 1e3 * f64::from(run));
+                all.push(r);
+            }
+        }
+        fit(&Campaign::new(all), &described(&spec, 2.0), &options).unwrap()
+    });
+    assert!(!once.summary.adjusted.is_empty());
+    for (a, b) in once.summary.adjusted.iter().zip(&often.summary.adjusted) {
+        let (few, many) = (a.value, b.value);
+        // The search ends where a step gains less than a ten-thousandth.
+        assert!((few - many).abs() < 0.01 * few.abs() + 0.02, "{}: {few} once, {many} often", a.name);
+    }
 }
 
 #[test]

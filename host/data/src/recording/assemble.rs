@@ -4,6 +4,7 @@ mod held_lengths;
 mod look_up;
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
 
 use self::held_lengths::held_lengths;
@@ -355,6 +356,13 @@ fn groups(splits: &[TextColumn], keep: Option<&[bool]>, rows: usize) -> Vec<Grou
     groups.into_iter().map(|(labels, rows)| (labels, Some(rows))).collect()
 }
 
+/// The rows as a range, where they follow one another.
+fn contiguous(rows: &[u32]) -> Option<Range<usize>> {
+    let first = *rows.first()? as usize;
+    let follow = rows.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    follow.then_some(first..first + rows.len())
+}
+
 fn take(
     job: &Job<'_>,
     table: &mut Table,
@@ -362,10 +370,14 @@ fn take(
     names: &[String],
     labels: &[String],
 ) -> Result<Recording> {
-    let mut column = |quantity: Quantity| match &rows {
+    let stretch = rows.as_deref().and_then(contiguous);
+    let mut column = |quantity: Quantity| match (&rows, &stretch) {
         // The whole file: its columns move over without a copy.
-        None => table.quantities.remove(&quantity),
-        Some(rows) => table
+        (None, _) => table.quantities.remove(&quantity),
+        (_, Some(stretch)) => {
+            table.quantities.get(&quantity).and_then(|c| c.get(stretch.clone())).map(<[f64]>::to_vec)
+        }
+        (Some(rows), None) => table
             .quantities
             .get(&quantity)
             .map(|c| rows.iter().filter_map(|r| c.get(*r as usize).copied()).collect()),

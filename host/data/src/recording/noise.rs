@@ -11,6 +11,10 @@ use crate::statistics::{deviation_from_median, median, range};
 /// many neighbours are equal is quantised; its noise is at least that of its step q, q/√12. 0 for fewer than three samples.
 #[must_use]
 pub fn white_noise(column: &[f64]) -> f64 {
+    // A held length that was typed in.
+    if column.iter().all(|value| *value == column[0]) {
+        return 0.0;
+    }
     let second = lagged_noise(column, 1);
     if column.len() < FOURTH_DIFFERENCES {
         return second.max(quantisation_noise(column));

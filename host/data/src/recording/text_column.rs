@@ -16,6 +16,12 @@ impl TextColumn {
         self.codes.push(code);
     }
 
+    /// Pushes a word `times` times.
+    pub(super) fn push_many(&mut self, word: &str, times: usize) {
+        let code = self.code(word);
+        self.codes.extend(std::iter::repeat_n(code, times));
+    }
+
     fn code(&mut self, word: &str) -> u32 {
         // Neighbouring rows mostly carry the same word.
         if let Some(last) = self.codes.last()

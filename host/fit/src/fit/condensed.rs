@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::design::Bin;
 use super::points::Point;
 use super::problem::Problem;
 
@@ -24,6 +25,26 @@ struct Cell {
     force: f64,
 }
 
+/// About how many bins of pressure the condensed problem has: a spline of some ten nodes hardly bends within one.
+const BINS: usize = 256;
+
+/// Bins of `together` bins each, at the mean pressure of their points.
+fn wide_bins(problem: &Problem, weights: &[f64], together: u32) -> Vec<Bin> {
+    let design = &problem.design;
+    let mut means = vec![(0.0, 0.0); design.bins.len().div_ceil(together as usize)];
+    for (row, w) in design.rows.iter().zip(weights) {
+        let mean = &mut means[(row.bin / together) as usize];
+        mean.0 += w * row.pressure;
+        mean.1 += w;
+    }
+    let bins = design.bins.chunks(together as usize).zip(means);
+    let wide = |(bins, (sum, weight)): (&[Bin], (f64, f64))| {
+        let middle = &bins[bins.len() / 2];
+        if weight > 0.0 { Bin { phi: design.basis.at(sum / weight), group: middle.group } } else { middle.clone() }
+    };
+    bins.map(wide).collect()
+}
+
 /// The condensed problem; `mounting` is the index of each point's mounting. `None` where a point has no mounting, or where little would
 /// be saved. Points without weight are left out.
 pub(super) fn condense(
@@ -32,13 +53,15 @@ pub(super) fn condense(
     mounting: &[Option<usize>],
 ) -> Option<Condensed> {
     let rows = &problem.design.rows;
+    // Bins are in the order of pressure.
+    let together = problem.design.bins.len().div_ceil(BINS).max(1) as u32;
     let mut place: HashMap<(usize, i8, u32), usize> = HashMap::new();
     let mut cells: Vec<Cell> = Vec::new();
     for (i, ((row, w), mounting)) in rows.iter().zip(weights).zip(mounting).enumerate() {
         if *w <= 0.0 {
             continue;
         }
-        let key = ((*mounting)?, row.direction as i8, row.bin);
+        let key = ((*mounting)?, row.direction as i8, row.bin / together);
         let at = *place.entry(key).or_insert_with(|| {
             cells.push(Cell { first: i, weight: 0.0, pressure: 0.0, force: 0.0 });
             cells.len() - 1
@@ -52,13 +75,14 @@ pub(super) fn condense(
         return None;
     }
     let mut condensed = problem.clone();
+    condensed.design.bins = wide_bins(problem, weights, together);
     let mean = |cell: &Cell| (cell.pressure / cell.weight, cell.force / cell.weight);
     condensed.design.rows = cells
         .iter()
         .map(|cell| {
             let (pressure, force) = mean(cell);
             let mut row = rows[cell.first];
-            (row.pressure, row.force) = (pressure, force);
+            (row.pressure, row.force, row.bin) = (pressure, force, row.bin / together);
             row
         })
         .collect();

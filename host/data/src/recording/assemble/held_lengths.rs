@@ -1,7 +1,6 @@
-//! One file of an isometric test at several lengths: where the length was set anew, and with it where a recording begins.
+//! One file of an isometric test at several lengths: where the length changes, and with it where a recording begins.
 
 use crate::recording::columns::HELD;
-use crate::recording::mountings::SAME_LENGTH;
 use crate::recording::motion::criteria::{STAY_ROWS, STAY_SWEEP};
 use crate::recording::text_column::TextColumn;
 use crate::statistics::{extremes, median};
@@ -16,7 +15,7 @@ fn stays(stroke: &[f64]) -> Option<Vec<usize>> {
         if (pair[1] - first).abs() <= HELD {
             continue;
         }
-        if (pair[1] - pair[0]).abs() <= SAME_LENGTH || row - start < STAY_ROWS {
+        if (pair[1] - pair[0]).abs() <= HELD || row - start < STAY_ROWS {
             return None;
         }
         ends.push(row);
@@ -43,19 +42,17 @@ pub(super) fn held_lengths(stroke: &[f64], pressure: &[f64]) -> Option<[TextColu
     let (mut lengths, mut runs) = (TextColumn::default(), TextColumn::default());
     let mut seen: Vec<(f64, usize)> = Vec::new();
     for (start, end) in ranges {
-        let here = stroke[start];
+        let here = stroke[start..end].iter().sum::<f64>() / (end - start) as f64;
         let known = seen.iter().position(|(length, _)| (length - here).abs() <= HELD);
         let visit = known.unwrap_or_else(|| {
             seen.push((here, 0));
             seen.len() - 1
         });
         seen[visit].1 += 1;
-        let length = format!("{} mm", (seen[visit].0 * 1e6).round() / 1e3);
-        let run = seen[visit].1.to_string();
-        for _ in start..end {
-            lengths.push(&length);
-            runs.push(&run);
-        }
+        // Hundredths of a millimetre; without the sign of a zero.
+        let length = format!("{} mm", (seen[visit].0 * 1e5).round() / 1e2 + 0.0);
+        lengths.push_many(&length, end - start);
+        runs.push_many(&seen[visit].1.to_string(), end - start);
     }
     Some([lengths, runs])
 }
