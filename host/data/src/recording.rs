@@ -54,7 +54,7 @@ pub use follow::{Follower, UNKNOWN_PAUSE};
 pub use header::has_decimal_commas;
 pub use import::{Import, Missing};
 pub use mountings::{Preceding, Rest, SAME_LENGTH, VENTING};
-pub use noise::white_noise;
+pub use noise::{resolution, white_noise};
 pub use quantity::{Named, Quantity, Unit, named};
 pub use read::{Hashes, Reader};
 pub use spikes::usual_change;

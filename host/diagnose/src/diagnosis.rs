@@ -22,6 +22,7 @@ use super::noise::Noise;
 use super::options::Options;
 use super::preconditions::{blocked_force, limitations, not_judged, unmet_precondition};
 use super::remark::{Remark, Unjudgeable};
+use super::resolution;
 use super::rest_friction;
 use super::rows::{self, Rows, SingleBladder};
 use super::selection_step::Selection;
@@ -73,6 +74,11 @@ fn ask(
     };
     let selected = select(&rows, options, known, (blocked, step), &mut remarks);
     let excess = Excess::of(&selected, blocked, step, &mut remarks);
+    let coarse = resolution::of_stroke(&selected.selection.rows);
+    if coarse > LACK_OF_FIT * blocked {
+        let step = selected.selection.rows.stroke_step;
+        remarks.push(Remark::CoarseStroke { step, force: coarse });
+    }
     let located = Located::of(&selected, &excess, blocked, step);
     let verdict = judge(&selected, &excess, located.line.as_ref());
     let kind = selected.selection.joint.kind;

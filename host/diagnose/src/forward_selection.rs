@@ -90,7 +90,7 @@ impl<'a> ForwardSelection<'a> {
         let order = if rows.isometric { TABLE_ORDER } else { ORDERS };
         let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
         let weight = energy(rows.root_weight()).max(1e-12);
-        let noise = noise::estimate(rows, &flexible.residual, step);
+        let noise = noise::estimate(&baselines::linearised(rows, &flexible), &flexible.residual, step);
         let scale = Scale {
             weight,
             independent: noise.independent.max(rows.blocks as f64),

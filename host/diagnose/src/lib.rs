@@ -70,6 +70,7 @@ pub mod refitted_table;
 pub mod remark;
 mod renewed_laws;
 pub mod reserve;
+mod resolution;
 mod rest_friction;
 mod rows;
 mod selection_step;

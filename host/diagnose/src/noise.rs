@@ -13,6 +13,7 @@ use super::criteria::noise::{
 };
 use super::linear::{Random, energy};
 use super::remark::Scatter;
+use super::resolution;
 use super::rows::Rows;
 use pam_data::statistics::{median, quantile};
 
@@ -187,7 +188,7 @@ pub(crate) fn independent_beside(rows: &Rows, residual: &[f64], alone: f64, trac
 pub(crate) fn estimate(rows: &Rows, residual: &[f64], step: f64) -> Noise {
     let effective = rows.effective().max(1) as f64;
     let rms = (energy(residual) / energy(rows.root_weight()).max(1e-12)).sqrt();
-    let repeats = from_repeats(rows, residual);
+    let repeats = from_repeats(rows, residual).map(|sigma| sigma.hypot(resolution::of_stroke(rows)));
     let sigma = repeats.unwrap_or(rms).min(rms);
     let memory = correlation_time(rows, residual, step);
     let independent = (effective * step / memory).clamp(2.0, effective);

@@ -124,6 +124,13 @@ pub enum Remark {
         /// The reading, N.
         force: f64,
     },
+    /// The displacement is read in steps that are worth more force than the model admits as lack of fit.
+    CoarseStroke {
+        /// The step, m.
+        step: f64,
+        /// Root mean square error of the model's force by it, N.
+        force: f64,
+    },
     /// What screening of the recordings reported, in the data library's words.
     Screening(String),
     /// Isolated force readings, excluded.

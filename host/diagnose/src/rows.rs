@@ -22,9 +22,9 @@ use super::criteria::rows::{ONE_SPEED, PRESSURE_TRIM, SPEED_TRIM, SPIKES_MENTION
 use super::remark::Remark;
 use pam_data::error::Result;
 use pam_data::progress::SharedProgress;
-use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
+use pam_data::recording::{Campaign, resolution};
 use pam_data::statistics::quantile;
 use pam_fit::Clip;
 
@@ -69,6 +69,8 @@ pub(crate) struct Recorded {
     pub has_temperature: bool,
     /// Whether the length never moved.
     pub isometric: bool,
+    /// The coarsest step in which a recording's displacement is read, m; zero where all are read finely.
+    pub stroke_step: f64,
 }
 
 /// What friction does at rest, row by row; all zeros where it stays as the model holds it.
@@ -224,6 +226,7 @@ impl Rows {
             samples: self.samples,
             has_temperature: self.has_temperature,
             isometric: self.isometric,
+            stroke_step: self.stroke_step,
         };
         let rest_friction = RestFriction {
             settling: pick(stride, &self.at_rest().settling),
@@ -306,6 +309,7 @@ pub(crate) fn prepare_corrected(
         samples: campaign.samples(),
         has_temperature: gathered.has_temperature,
         isometric,
+        stroke_step: campaign.recordings.iter().map(|r| resolution(&r.stroke)).fold(0.0, f64::max),
     };
     let rows = Rows {
         recorded: Arc::new(recorded),

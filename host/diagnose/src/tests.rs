@@ -167,6 +167,27 @@ fn a_force_that_beats_while_the_length_is_held_gets_an_answer() {
 }
 
 #[test]
+fn a_coarse_displacement_is_no_physics() {
+    let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
+    for r in &mut campaign.recordings {
+        r.stroke.iter_mut().for_each(|x| *x = (*x / 2e-4).round() * 2e-4);
+        // Few rows in each step: no smoothing brings back what was between.
+        let few = |column: &mut Vec<f64>| *column = column.iter().step_by(8).copied().collect();
+        [&mut r.time, &mut r.pressure, &mut r.stroke].into_iter().chain(&mut r.force).for_each(few);
+    }
+    let d = ask(&campaign);
+    assert_eq!((d.verdict(), names(&d)), (Verdict::Consistent, vec![]), "{:?}", d.unexplained);
+    let coarse = d.remarks.iter().find_map(|r| match r {
+        Remark::CoarseStroke { step, force } => Some((*step, *force)),
+        _ => None,
+    });
+    let (step, force) = coarse.unwrap_or_else(|| panic!("{:?}", d.remarks));
+    assert!((step - 2e-4).abs() < 1e-9, "{step} m");
+    // Repeats of a stroke are read in the same steps, and do not show them.
+    assert!(d.noise_N > 0.2 && force > d.noise_N, "{} N of noise, {force} N by the steps", d.noise_N);
+}
+
+#[test]
 fn the_end_of_the_sensors_range_is_no_physics() {
     let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.3, 2.0), |_, _, _| 0.0);
     let forces = || campaign.recordings.iter().flat_map(|r| r.force.clone().unwrap_or_default());

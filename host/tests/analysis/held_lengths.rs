@@ -130,7 +130,8 @@ fn one_file_of_several_lengths_gives_the_table_of_separate_files() {
     assert_eq!(titles.len(), 4, "{titles:?}");
     assert!(titles[0].ends_with(" mm, run 1") && titles[3].ends_with(" mm, run 2"), "{titles:?}");
     let muscle = description(&spec);
-    let [one, separate] = [read, Campaign::new(visits)].map(|c| fit(&c, &muscle, &Options::default()).unwrap());
+    let [one, separate] =
+        [read, Campaign::new(visits)].map(|c| fit(&c, &muscle, &Options::default()).unwrap());
     let of = |f: &pam_fit::Fit| (f.summary.deadband_kPa, f.summary.rms_N);
     let ((p, rms), (separate_p, separate_rms)) = (of(&one), of(&separate));
     assert!((p - separate_p).abs() < 0.01, "{p} and {separate_p} kPa");

@@ -1,7 +1,8 @@
 //! How noisy a column is, robustly, beside whatever motion it shows.
 
 use super::motion::criteria::{
-    FOURTH_DIFFERENCES, NOISE_SAMPLES, QUANTISED_CHANGES, QUANTISED_LEVELS, QUANTISED_REPEATS, QUANTUM_SAMPLES,
+    FOURTH_DIFFERENCES, NOISE_SAMPLES, QUANTISED_CHANGES, QUANTISED_LEVELS, QUANTISED_REPEATS,
+    QUANTUM_SAMPLES,
 };
 use crate::statistics::{deviation_from_median, median, range};
 
@@ -27,6 +28,12 @@ pub fn white_noise(column: &[f64]) -> f64 {
 /// The noise of a converter whose steps are so wide that many neighbours read the same; 0 for other columns, and for those that hold
 /// a few values that were set.
 fn quantisation_noise(column: &[f64]) -> f64 {
+    resolution(column) / 12f64.sqrt()
+}
+
+/// The step of a converter so coarse that many neighbours read the same, in the unit of the column; 0 for other columns.
+#[must_use]
+pub fn resolution(column: &[f64]) -> f64 {
     let some = &column[..column.len().min(QUANTUM_SAMPLES)];
     let equal = some.windows(2).filter(|w| w[0] == w[1]).count();
     if equal * QUANTISED_REPEATS <= some.len() {
@@ -34,7 +41,7 @@ fn quantisation_noise(column: &[f64]) -> f64 {
     }
     let step = quantum(some);
     let changes_often = (some.len() - equal) * QUANTISED_CHANGES > some.len();
-    if changes_often || range(some) >= QUANTISED_LEVELS * step { step / 12f64.sqrt() } else { 0.0 }
+    if changes_often || range(some) >= QUANTISED_LEVELS * step { step } else { 0.0 }
 }
 
 /// As [`white_noise`], from second differences over `lag` samples.

@@ -39,19 +39,19 @@ fn wide_bins(problem: &Problem, weights: &[f64], together: u32) -> Vec<Bin> {
     }
     let bins = design.bins.chunks(together as usize).zip(means);
     let wide = |(bins, (sum, weight)): (&[Bin], (f64, f64))| {
-        let middle = &bins[bins.len() / 2];
-        if weight > 0.0 { Bin { phi: design.basis.at(sum / weight), group: middle.group } } else { middle.clone() }
+        let first = &bins[0];
+        if weight > 0.0 {
+            Bin { phi: design.basis.at(sum / weight), group: first.group }
+        } else {
+            first.clone()
+        }
     };
     bins.map(wide).collect()
 }
 
 /// The condensed problem; `mounting` is the index of each point's mounting. `None` where a point has no mounting, or where little would
 /// be saved. Points without weight are left out.
-pub(super) fn condense(
-    problem: &Problem,
-    weights: &[f64],
-    mounting: &[Option<usize>],
-) -> Option<Condensed> {
+pub(super) fn condense(problem: &Problem, weights: &[f64], mounting: &[Option<usize>]) -> Option<Condensed> {
     let rows = &problem.design.rows;
     // Bins are in the order of pressure.
     let together = problem.design.bins.len().div_ceil(BINS).max(1) as u32;

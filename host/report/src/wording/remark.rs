@@ -64,6 +64,11 @@ pub fn remark(remark: &Remark) -> String {
             if *change > 0.0 { "rises" } else { "falls" },
             100.0 * change.abs()
         ),
+        Remark::CoarseStroke { step, force } => format!(
+            "the displacement is read in steps of {:.2} mm, an error of up to {force:.2} N rms in the model's force: smaller errors of the \
+             model are hardly visible. Use a displacement sensor of finer resolution",
+            step * 1e3
+        ),
         Remark::NoRepeats => {
             "no stroke is repeated under the same conditions: the noise is estimated from the residual of the most flexible model".to_owned()
         }

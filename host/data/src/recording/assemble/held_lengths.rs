@@ -73,7 +73,10 @@ mod tests {
         let (stroke, pressure) = sweeps(&[0.0, 7.5, 0.0], 50);
         let [lengths, runs] = held_lengths(&stroke, &pressure).expect("three stays");
         let at = |row: usize| (lengths.get(row), runs.get(row));
-        assert_eq!([at(0), at(49), at(50), at(149)], [("0 mm", "1"), ("0 mm", "1"), ("7.5 mm", "1"), ("0 mm", "2")]);
+        assert_eq!(
+            [at(0), at(49), at(50), at(149)],
+            [("0 mm", "1"), ("0 mm", "1"), ("7.5 mm", "1"), ("0 mm", "2")]
+        );
     }
 
     #[test]
