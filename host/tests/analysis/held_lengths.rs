@@ -138,6 +138,32 @@ fn one_file_of_several_lengths_gives_the_table_of_separate_files() {
     assert!((rms / separate_rms - 1.0).abs() < 0.01, "{rms} and {separate_rms} N");
 }
 
+/// A sensor of the stroke with 20 µm of noise: the lengths are held nevertheless, and the one at rest length is no further length.
+#[test]
+fn noise_of_the_stroke_sensor_hides_no_held_length() {
+    let spec = presets::contractile();
+    let mut campaign = staircases(&spec, 1);
+    let rest = campaign.recordings[0].stroke[0];
+    let mut noisy = campaign.clone();
+    let mut row = 0.0_f64;
+    for (clean, r) in campaign.recordings.iter_mut().zip(&mut noisy.recordings) {
+        clean.stroke.iter_mut().for_each(|x| *x -= rest);
+        for (x, clean) in r.stroke.iter_mut().zip(&clean.stroke) {
+            row += 1.0;
+            // The sum of three uniform numbers is nearly normal.
+            let uniform = |k: f64| (43_758.5 * (12.9898 * row + k).sin()).rem_euclid(1.0) - 0.5;
+            *x = clean + 40e-6 * (uniform(0.0) + uniform(1.0) + uniform(2.0));
+        }
+    }
+    let muscle = description(&spec);
+    let [clean, noisy] = [campaign, noisy].map(|c| fit(&c, &muscle, &Options::default()).unwrap());
+    assert_eq!(noisy.solution.problem.points.held_lengths().len(), 3);
+    let rank = |f: &pam_fit::Fit| f.solution.problem.design.orthonormal.rank;
+    assert_eq!(rank(&noisy), rank(&clean));
+    let (p, clean_p) = (noisy.summary.deadband_kPa, clean.summary.deadband_kPa);
+    assert!((p - clean_p).abs() < 3.0, "P0 {p} kPa, without noise {clean_p} kPa");
+}
+
 /// Runs that repeat are condensed while dimensions are searched for.
 #[test]
 fn dimensions_from_runs_that_repeat_are_those_of_one_run() {

@@ -90,7 +90,9 @@ pub(super) fn assemble(job: &Job<'_>, mut rows: Rows) -> Result<Vec<Recording>> 
         table.splits.push(runs_of_clock(time));
     }
     if table.splits.is_empty() {
-        split_at_held_lengths(&mut table, &mut names, keep.as_deref(), job.plan.stroke);
+        let own = table.quantities.get(&Quantity::RestLength).and_then(|c| c.first().copied());
+        let rest_length = job.rest_length.or(own);
+        split_at_held_lengths(&mut table, &mut names, keep.as_deref(), job.plan.stroke, rest_length);
     }
     let groups = groups(&table.splits, keep.as_deref(), rows.rows);
     let mut recordings = Vec::with_capacity(groups.len());
@@ -287,35 +289,40 @@ fn runs_of_clock(time: &[f64]) -> TextColumn {
     runs
 }
 
-/// Splits a file that holds several lengths, one after another, where nothing else splits it.
+/// Splits a file that holds several lengths, one after another, where nothing else splits it. `rest_length` in m, where it is known.
 fn split_at_held_lengths(
     table: &mut Table,
     names: &mut Vec<String>,
     keep: Option<&[bool]>,
     stroke: Option<Quantity>,
+    rest_length: Option<f64>,
 ) {
     let stroke = stroke.unwrap_or(Quantity::Displacement);
-    // Contractions have no unit: a stay has no length in mm before the rest length is known.
-    if !matches!(stroke, Quantity::Displacement | Quantity::Length) {
-        return;
-    }
-    let (Some(length), Some(pressure)) =
-        (table.quantities.get(&stroke), table.quantities.get(&Quantity::Pressure))
+    // A contraction is a share of the rest length.
+    let metres = if stroke == Quantity::Contraction { rest_length } else { Some(1.0) };
+    let (Some(column), Some(pressure), Some(metres)) =
+        (table.quantities.get(&stroke), table.quantities.get(&Quantity::Pressure), metres)
     else {
         return;
     };
-    let columns = match keep {
-        None => held_lengths(length, pressure),
-        Some(keep) => {
-            let kept = |column: &[f64]| -> Vec<f64> {
-                column.iter().zip(keep).filter_map(|(v, k)| k.then_some(*v)).collect()
-            };
-            held_lengths(&kept(length), &kept(pressure)).map(|columns| columns.map(|c| spread(&c, keep)))
-        }
+    // Hundredths of a millimetre or of a percent; without the sign of a zero.
+    let hundredths = |value: f64| (1e2 * value).round() / 1e2 + 0.0;
+    let label = |length: f64| match stroke {
+        Quantity::Contraction => format!("{} %", hundredths(1e2 * length / metres)),
+        _ => format!("{} mm", hundredths(1e3 * length)),
+    };
+    let kept = |column: &[f64], factor: f64| -> Vec<f64> {
+        let all = column.iter().enumerate().filter(|(row, _)| keep.is_none_or(|k| k[*row]));
+        all.map(|(_, value)| factor * value).collect()
+    };
+    let columns = if keep.is_none() && metres == 1.0 {
+        held_lengths(column, pressure, label)
+    } else {
+        held_lengths(&kept(column, metres), &kept(pressure, 1.0), label)
     };
     if let Some(columns) = columns {
         names.extend([stroke.name().to_owned(), "run".to_owned()]);
-        table.splits.extend(columns);
+        table.splits.extend(columns.map(|c| keep.map_or(c.clone(), |keep| spread(&c, keep))));
     }
 }
 

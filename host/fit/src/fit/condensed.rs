@@ -23,6 +23,7 @@ struct Cell {
     weight: f64,
     pressure: f64,
     force: f64,
+    stroke: f64,
 }
 
 /// About how many bins of pressure the condensed problem has: a spline of some ten nodes hardly bends within one.
@@ -63,13 +64,14 @@ pub(super) fn condense(problem: &Problem, weights: &[f64], mounting: &[Option<us
         }
         let key = ((*mounting)?, row.direction as i8, row.bin / together);
         let at = *place.entry(key).or_insert_with(|| {
-            cells.push(Cell { first: i, weight: 0.0, pressure: 0.0, force: 0.0 });
+            cells.push(Cell { first: i, weight: 0.0, pressure: 0.0, force: 0.0, stroke: 0.0 });
             cells.len() - 1
         });
         let cell = &mut cells[at];
         cell.weight += w;
         cell.pressure += w * row.pressure;
         cell.force += w * row.force;
+        cell.stroke += w * problem.points.list[i].stroke;
     }
     if 2 * cells.len() > rows.len() {
         return None;
@@ -91,7 +93,8 @@ pub(super) fn condense(problem: &Problem, weights: &[f64], mounting: &[Option<us
         .iter()
         .map(|cell| {
             let (pressure, force) = mean(cell);
-            Point { pressure, force, ..problem.points.list[cell.first] }
+            let stroke = cell.stroke / cell.weight;
+            Point { pressure, force, stroke, ..problem.points.list[cell.first] }
         })
         .collect();
     condensed.points = Arc::new(points);

@@ -222,12 +222,15 @@ fn spread(points: &Points, shift: &[f64], braid: &Braid<f64>, used: &[PointUse])
         }
     }
     let mut last = f64::NEG_INFINITY;
-    let same = if points.held_lengths().is_empty() { 0.0 } else { HELD };
+    let held = !points.held_lengths().is_empty();
+    let noise = APART * points.stroke_noise;
+    let same = if held { HELD } else { 0.0 }.max(noise);
     let apart = |(stroke, shift): (f64, f64)| {
-        let far = stroke - last > same.max(APART * points.stroke_noise);
-        far.then(|| {
+        (stroke - last > same).then(|| {
             last = stroke;
-            columns(braid, stroke + shift)
+            // A mounting at rest length says nothing of the elasticity, however its readings scatter about zero.
+            let at_rest = held && (stroke + shift).abs() < noise;
+            columns(braid, if at_rest { 0.0 } else { stroke + shift })
         })
     };
     taken.into_iter().flatten().filter_map(apart).collect()

@@ -1,34 +1,40 @@
 //! One file of an isometric test at several lengths: where the length changes, and with it where a recording begins.
 
-use crate::recording::columns::HELD;
+use crate::recording::columns::{HELD, held_tolerance};
 use crate::recording::motion::criteria::{STAY_ROWS, STAY_SWEEP};
 use crate::recording::text_column::TextColumn;
 use crate::statistics::{extremes, median};
 
 /// Stays at one length, each with the rows that it ends before; `None` where the stroke moves in between, or where there is one only.
 fn stays(stroke: &[f64]) -> Option<Vec<usize>> {
-    let mut first = *stroke.first()?;
-    let mut start = 0;
+    let tolerance = held_tolerance(stroke);
+    let (mut sum, mut start) = (*stroke.first()?, 0);
     let mut ends = Vec::new();
     for (row, pair) in stroke.windows(2).enumerate() {
         let row = row + 1;
-        if (pair[1] - first).abs() <= HELD {
+        let count = row - start;
+        if (pair[1] - sum / count as f64).abs() <= tolerance {
+            sum += pair[1];
             continue;
         }
-        if (pair[1] - pair[0]).abs() <= HELD || row - start < STAY_ROWS {
+        if (pair[1] - pair[0]).abs() <= tolerance || count < STAY_ROWS {
             return None;
         }
         ends.push(row);
-        (first, start) = (pair[1], row);
+        (sum, start) = (pair[1], row);
     }
     ends.push(stroke.len());
     (ends.len() > 1 && stroke.len() - start >= STAY_ROWS).then_some(ends)
 }
 
-/// The held length in mm and the number of its stay, for each row, where the whole file is an isometric test at several lengths: the
-/// stroke jumps from one held length to another, and the pressure moves at each. Where the stroke is stepped at held pressures instead,
-/// the steps are the motion, and the file stays whole.
-pub(super) fn held_lengths(stroke: &[f64], pressure: &[f64]) -> Option<[TextColumn; 2]> {
+/// The held length as `label` writes it and the number of its stay, for each row, where the whole file is an isometric test at several
+/// lengths: the stroke (m) jumps from one held length to another, and the pressure moves at each. Where the stroke is stepped at held
+/// pressures instead, the steps are the motion, and the file stays whole.
+pub(super) fn held_lengths(
+    stroke: &[f64],
+    pressure: &[f64],
+    label: impl Fn(f64) -> String,
+) -> Option<[TextColumn; 2]> {
     let ends = stays(stroke)?;
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let ranges: Vec<_> = starts.zip(ends.iter().copied()).collect();
@@ -49,9 +55,7 @@ pub(super) fn held_lengths(stroke: &[f64], pressure: &[f64]) -> Option<[TextColu
             seen.len() - 1
         });
         seen[visit].1 += 1;
-        // Hundredths of a millimetre; without the sign of a zero.
-        let length = format!("{} mm", (seen[visit].0 * 1e5).round() / 1e2 + 0.0);
-        lengths.push_many(&length, end - start);
+        lengths.push_many(&label(seen[visit].0), end - start);
         runs.push_many(&seen[visit].1.to_string(), end - start);
     }
     Some([lengths, runs])
@@ -68,27 +72,47 @@ mod tests {
         (stroke, pressure)
     }
 
+    fn millimetres(stroke: f64) -> String {
+        format!("{} mm", (1e3 * stroke).round())
+    }
+
+    fn split(stroke: &[f64], pressure: &[f64]) -> Option<[TextColumn; 2]> {
+        held_lengths(stroke, pressure, millimetres)
+    }
+
     #[test]
     fn each_stay_at_a_length_is_a_run_of_it() {
-        let (stroke, pressure) = sweeps(&[0.0, 7.5, 0.0], 50);
-        let [lengths, runs] = held_lengths(&stroke, &pressure).expect("three stays");
+        let (stroke, pressure) = sweeps(&[0.0, 7.2, 0.0], 50);
+        let [lengths, runs] = split(&stroke, &pressure).expect("three stays");
         let at = |row: usize| (lengths.get(row), runs.get(row));
         assert_eq!(
             [at(0), at(49), at(50), at(149)],
-            [("0 mm", "1"), ("0 mm", "1"), ("7.5 mm", "1"), ("0 mm", "2")]
+            [("0 mm", "1"), ("0 mm", "1"), ("7 mm", "1"), ("0 mm", "2")]
         );
+    }
+
+    #[test]
+    fn the_noise_of_the_sensor_is_no_motion() {
+        let (mut stroke, pressure) = sweeps(&[0.0, 7.2, 0.0], 500);
+        for (i, x) in stroke.iter_mut().enumerate() {
+            // Uniform within 50 µm on either side.
+            *x += 1e-4 * ((43_758.5 * (12.9898 * i as f64).sin()).rem_euclid(1.0) - 0.5);
+        }
+        let [lengths, runs] = split(&stroke, &pressure).expect("three stays");
+        let at = |row: usize| (lengths.get(row), runs.get(row));
+        assert_eq!([at(499), at(500), at(1499)], [("0 mm", "1"), ("7 mm", "1"), ("0 mm", "2")]);
     }
 
     #[test]
     fn strokes_that_move_or_step_at_held_pressure_stay_whole() {
         let (stroke, pressure) = sweeps(&[0.0, 7.5, 15.0], 50);
-        assert!(held_lengths(&stroke[..50], &pressure[..50]).is_none(), "one length");
+        assert!(split(&stroke[..50], &pressure[..50]).is_none(), "one length");
         let held: Vec<f64> = (0..150).map(|i| 1e5 * f64::from(i / 50)).collect();
-        assert!(held_lengths(&stroke, &held).is_none(), "the stroke steps at held pressures");
+        assert!(split(&stroke, &held).is_none(), "the stroke steps at held pressures");
         let ramp: Vec<f64> = (0..150).map(|i| 1e-5 * f64::from(i)).collect();
-        assert!(held_lengths(&ramp, &pressure).is_none(), "the stroke moves");
+        assert!(split(&ramp, &pressure).is_none(), "the stroke moves");
         let mut moved = stroke.clone();
         moved[50] = 3e-3;
-        assert!(held_lengths(&moved, &pressure).is_none(), "the move is part of the recording");
+        assert!(split(&moved, &pressure).is_none(), "the move is part of the recording");
     }
 }
