@@ -228,7 +228,7 @@ fn spread(points: &Points, shift: &[f64], braid: &Braid<f64>, used: &[PointUse])
     let apart = |(stroke, shift): (f64, f64)| {
         (stroke - last > same).then(|| {
             last = stroke;
-            // A mounting at rest length says nothing of the elasticity, however its readings scatter about zero.
+            // A mounting at rest length does not show the elasticity, however its readings scatter about zero.
             let at_rest = held && (stroke + shift).abs() < noise;
             columns(braid, if at_rest { 0.0 } else { stroke + shift })
         })
