@@ -15,13 +15,15 @@ use super::criteria::candidates::LEAST_SIGMA;
 use super::criteria::selection::{
     ALIKE, ALONE_FLOOR, CONFUSABLE, EXCHANGE_LEAVES, FAMILY_ALPHA, FEWEST_INDEPENDENT, FIRST_STROKES,
     FURTHER_SHARE, KEPT_GAIN, LEAST_EXCESS, LEAST_SCORE, LEAST_SCORE_ALONE, LEAST_SHARE, MOST_COMPETITORS,
-    MOST_EXCLUDED, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, SELECTION_FLOOR, SHADOW,
+    MOST_EXCLUDED, MOST_SELECTED, NARROW_FLOOR, NARROW_PEAK, NARROW_SCORE, RESOLUTION_FLOOR, SELECTION_FLOOR,
+    SHADOW,
 };
 use super::free_zero::fall_beside_free_zero;
 use super::likelihood::Scale;
 use super::linear::energy;
 use super::noise::{self, Noise};
 use super::remark::{Refusal, Remark};
+use super::resolution;
 use super::rows::{ORDERS, Rows};
 use super::selection_step::{
     JointFit, SelectedEffect, Selection, best_of_each, competitors, is_selectable, model_weight, refit,
@@ -307,7 +309,11 @@ impl<'a> ForwardSelection<'a> {
             (true, false) => 1.0,
             (false, _) => ALONE_FLOOR,
         };
-        significant && moved >= least * SELECTION_FLOOR * self.blocked
+        // What moves the force by less than coarse steps of the displacement do may be their pattern.
+        significant
+            && moved
+                >= (least * SELECTION_FLOOR * self.blocked)
+                    .max(RESOLUTION_FLOOR * resolution::of_stroke(&self.rows))
     }
 
     /// Refits all effects jointly with these. They are selected if each keeps most of its gain; else the first that does not is excluded.

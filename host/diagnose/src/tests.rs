@@ -187,6 +187,17 @@ fn a_coarse_displacement_is_no_physics() {
     assert!(d.noise_N > 0.2 && force > d.noise_N, "{} N of noise, {force} N by the steps", d.noise_N);
 }
 
+/// A stroke of seven steps: their error follows the reversals as a friction might.
+#[test]
+fn very_coarse_steps_of_the_displacement_are_no_friction() {
+    let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.1, 2.0), |_, _, _| 0.0);
+    for r in &mut campaign.recordings {
+        r.stroke.iter_mut().for_each(|x| *x = (*x / 4e-4).round() * 4e-4);
+    }
+    let d = ask(&campaign);
+    assert_eq!(names(&d), Vec::<&str>::new(), "{:?}", d.unexplained);
+}
+
 #[test]
 fn the_end_of_the_sensors_range_is_no_physics() {
     let mut campaign = recorded(loops(&[0.2]), 5, coloured(0.3, 2.0), |_, _, _| 0.0);

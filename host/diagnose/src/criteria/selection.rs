@@ -73,6 +73,8 @@ pam_data::criteria! {
     MOST_REPORTED: usize = 8, "n_rep", "1", Cost;
     /// A competitor of this weight explains what the selected effect explains.
     ALIKE: f64 = 0.5, "w_alike", "1", Judgement;
+    /// An effect moves the force by at least this share of what the steps of a coarse displacement are worth: smoothing removes about half.
+    RESOLUTION_FLOOR: f64 = 0.5, "q_res", "1", Judgement;
     /// Competitors of less weight than this are dropped unless their traces are parallel.
     NEGLIGIBLE_COMPETITOR: f64 = 0.01, "w_min", "1", Judgement;
     /// With more competitors than this no effect is selected.
