@@ -92,7 +92,9 @@ impl<'a> ForwardSelection<'a> {
         let order = if rows.isometric { TABLE_ORDER } else { ORDERS };
         let flexible = baselines::fit(rows, Kind::Flexible(order), &[]);
         let weight = energy(rows.root_weight()).max(1e-12);
-        let noise = noise::estimate(&baselines::linearised(rows, &flexible), &flexible.residual, step);
+        // Coarse steps of the displacement are worth what the slope of the model makes of them.
+        let coarse = (rows.stroke_step > 0.0).then(|| baselines::linearised(rows, &flexible));
+        let noise = noise::estimate(coarse.as_ref().unwrap_or(rows), &flexible.residual, step);
         let scale = Scale {
             weight,
             independent: noise.independent.max(rows.blocks as f64),

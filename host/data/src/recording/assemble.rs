@@ -322,7 +322,10 @@ fn split_at_held_lengths(
     };
     if let Some(columns) = columns {
         names.extend([stroke.name().to_owned(), "run".to_owned()]);
-        table.splits.extend(columns.map(|c| keep.map_or(c.clone(), |keep| spread(&c, keep))));
+        table.splits.extend(columns.map(|column| match keep {
+            Some(keep) => spread(&column, keep),
+            None => column,
+        }));
     }
 }
 
