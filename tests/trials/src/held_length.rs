@@ -12,10 +12,11 @@ use crate::rate::Rate;
 use crate::residuals::Residuals;
 use crate::spec::{self, Operator, Size, Spec};
 use crate::tool;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
 
@@ -89,8 +90,8 @@ impl Case {
 }
 
 /// What an answer says about the effect that is there.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Said {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Said {
     /// Named.
     Named,
     /// Another effect of its class is named, or it is in the reported set.
@@ -135,12 +136,47 @@ impl Said {
     }
 }
 
+/// What is kept of an answer, for studies that read it.
+#[derive(Debug, Default, Clone, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Campaign, effect and seed.
+    pub case: String,
+    /// The statement about the effect that is there; none for a clean muscle.
+    pub said: Option<Said>,
+    /// Names in the order in which they were found.
+    pub named: Vec<String>,
+    /// Verdict, as in the JSON.
+    pub verdict: String,
+}
+
+/// The answers of a run, a JSON array.
+const ANSWERS: &str = "answers.json";
+
+/// The answers in a directory, in the order of the cases.
+///
+/// # Errors
+/// No readable answers there.
+pub fn outcomes(dir: &Path) -> Result<Vec<Outcome>, Box<dyn Error>> {
+    Ok(serde_json::from_str(&std::fs::read_to_string(dir.join(ANSWERS))?)?)
+}
+
 /// A case with its answer.
 struct Answered<'a> {
     case: &'a Case,
     answer: Answer,
     /// Peak of the effect, N.
     peak: f64,
+}
+
+impl Answered<'_> {
+    fn outcome(&self) -> Outcome {
+        Outcome {
+            case: self.case.name(),
+            said: self.case.effect.map(|effect| Said::of(&self.answer, effect, self.peak)),
+            named: self.answer.missing.iter().map(|m| m.effect.clone()).collect(),
+            verdict: self.answer.verdict.clone(),
+        }
+    }
 }
 
 /// Makes the recordings and has them diagnosed: the answer, and the peak of the effect, N.
@@ -243,6 +279,8 @@ pub fn run(what: &Held) -> Result<(), Box<dyn Error>> {
     })?;
     let all: Vec<Answered<'_>> =
         cases.iter().zip(answers).map(|(case, (answer, peak))| Answered { case, answer, peak }).collect();
+    let outcomes: Vec<Outcome> = all.iter().map(Answered::outcome).collect();
+    std::fs::write(what.output.join(ANSWERS), serde_json::to_string_pretty(&outcomes)?)?;
     let (clean, false_alarms) = clean_table(&all)?;
     let tables = format!("## Clean muscles\n\n{clean}\n## One effect\n\n{}", effect_table(&all)?);
     println!("{tables}");

@@ -10,7 +10,7 @@ mod page;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -82,11 +82,12 @@ pub struct Outcome {
 
 impl Outcome {
     /// Whether it is a single effect that counts.
-    fn counts(&self) -> bool {
+    pub fn counts(&self) -> bool {
         self.stratum == Stratum::Single && self.effects.iter().all(|e| e.1 >= LEAST)
     }
 
-    fn is_null(&self) -> bool {
+    /// Whether nothing changed.
+    pub fn is_null(&self) -> bool {
         self.effects.is_empty()
     }
 
@@ -94,11 +95,13 @@ impl Outcome {
         self.effects.first().map_or("", |e| e.0.as_str())
     }
 
-    fn class_right(&self) -> bool {
+    /// Whether the first name is of the class of the effect.
+    pub fn class_right(&self) -> bool {
         self.named.first().is_some_and(|n| class(&n.0) == class(self.truth()))
     }
 
-    fn exact(&self) -> bool {
+    /// Whether the first name is the effect.
+    pub fn exact(&self) -> bool {
         self.named.first().is_some_and(|n| n.0 == self.truth())
     }
 
@@ -125,7 +128,7 @@ fn campaign(files: &[virtual_bench::recording::Recording]) -> Campaign {
     Campaign::new(files.iter().filter(|f| f.rows.len() > 1).map(recording).collect())
 }
 
-fn ask(spec: &Spec, residuals: &Residuals, keep: Option<&std::path::Path>) -> Outcome {
+fn ask(spec: &Spec, residuals: &Residuals, keep: Option<&Path>) -> Outcome {
     let pair = generate::pair(spec, residuals);
     if let Some(folder) = keep {
         for (side, files) in [("before", &pair.before), ("after", &pair.after)] {
@@ -181,6 +184,28 @@ fn verdict(v: Verdict) -> &'static str {
     }
 }
 
+/// The answers of a set, a line of JSON each.
+const ANSWERS: &str = "answers.jsonl";
+
+/// The answers that a file holds. A line that was cut off when a run was interrupted is none.
+fn answered(path: &Path) -> BTreeMap<usize, Outcome> {
+    std::fs::read_to_string(path)
+        .unwrap_or_default()
+        .lines()
+        .filter_map(|l| serde_json::from_str::<Outcome>(l).ok())
+        .map(|o| (o.id, o))
+        .collect()
+}
+
+/// The answers of a set in its directory, in order.
+///
+/// # Errors
+/// No answers there.
+pub fn outcomes(dir: &Path) -> Result<Vec<Outcome>, String> {
+    let all: Vec<Outcome> = answered(&dir.join(ANSWERS)).into_values().collect();
+    if all.is_empty() { Err(format!("{}: no answers", dir.join(ANSWERS).display())) } else { Ok(all) }
+}
+
 /// Answers the set, as far as time allows, and scores what there is.
 ///
 /// # Errors
@@ -192,13 +217,8 @@ pub fn run(what: &Options, seed: u64, specs: Vec<Spec>) -> Result<(), Box<dyn Er
     let hash = Sha256::digest(seed.to_string().as_bytes());
     let hash: String = hash.iter().map(|b| format!("{b:02x}")).collect();
     println!("{} pairs; SHA-256 of the seed: {hash}", specs.len());
-    let path = output.join("answers.jsonl");
-    let mut done: BTreeMap<usize, Outcome> = std::fs::read_to_string(&path)
-        .unwrap_or_default()
-        .lines()
-        .filter_map(|l| serde_json::from_str::<Outcome>(l).ok())
-        .map(|o| (o.id, o))
-        .collect();
+    let path = output.join(ANSWERS);
+    let mut done = answered(&path);
     let residuals = Residuals::read(&what.set.what.data);
     let until = what.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
     let file = Mutex::new(std::fs::OpenOptions::new().create(true).append(true).open(&path)?);

@@ -16,17 +16,17 @@ use std::time::{Duration, Instant};
 
 pub mod ablation;
 mod page;
+mod subjects;
 
 use clap::Args;
 use pam_diagnose::criteria::{Criterion, PAGE, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::answer::{self, Asking};
-use crate::figures::big_and_visible;
-use crate::ledger::{self, Ledger};
-use crate::score::{self, Outcome};
+use crate::answer;
+use crate::ledger;
+use subjects::Subject;
 
-/// The trials that a study answers again and again, and the program that answers.
+/// The trials that a study answers again and again, and the programs that answer.
 #[derive(Args)]
 struct Answering {
     /// A development set: its trials are answered again for each row of the table.
@@ -37,9 +37,9 @@ struct Answering {
     /// Longest time for one answer, s.
     #[arg(long, default_value_t = 300)]
     limit: u64,
-    /// The program built earlier with `--cfg pam_study`; it is built in the output directory otherwise.
+    /// The directory with `host` and `trials` built earlier with `--cfg pam_study`; they are built in the output directory otherwise.
     #[arg(long)]
-    host: Option<PathBuf>,
+    programs: Option<PathBuf>,
 }
 
 /// Scale criteria one by one and count false alarms, right classes and changed answers.
@@ -68,12 +68,8 @@ const FACTORS: [f64; 2] = [0.5, 2.0];
 /// (Dorfman), and halving them again favours somewhat larger ones.
 const GROUP: usize = 8;
 
-/// Stages whose criteria loops of the virtual bench do not reach: comparisons with a reference, campaigns over months, isometric
-/// runs, proposals of recordings, the health of a table on a controller, stocks of muscles.
-const OTHER_DATA: [&str; 7] = ["reference", "history", "timeline", "experiment", "valve", "health", "stock"];
-
-/// What the trials showed with one criterion scaled.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The counts of some trials with one criterion scaled.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Row {
     criterion: String,
     factor: f64,
@@ -86,31 +82,12 @@ struct Row {
     unanswered: usize,
     /// What each trial named, in order of the trials.
     named: Vec<Vec<String>>,
+    /// The program that answered.
+    #[serde(default)]
+    tool: String,
 }
 
 impl Row {
-    fn of(criterion: &str, factor: f64, outcomes: &[Outcome]) -> Self {
-        let nulls = || {
-            outcomes.iter().filter(|o| {
-                matches!(o.stratum, crate::spec::Stratum::NullClean | crate::spec::Stratum::NullNasty)
-            })
-        };
-        let judged = || outcomes.iter().filter(|o| big_and_visible(o));
-        let names = |o: &Outcome| o.named.iter().map(|n| n.0.clone()).collect();
-        Self {
-            criterion: criterion.into(),
-            factor,
-            false_alarms: nulls().filter(|o| !o.named.is_empty()).count(),
-            nulls: nulls().count(),
-            class_right: judged().filter(|o| o.class_right).count(),
-            exact: judged().filter(|o| o.exact).count(),
-            judged: judged().count(),
-            wrong_class: judged().filter(|o| !o.named.is_empty() && !o.class_right).count(),
-            unanswered: outcomes.iter().filter(|o| o.verdict.starts_with("failed")).count(),
-            named: outcomes.iter().map(names).collect(),
-        }
-    }
-
     /// Trials whose names differ from those of the criteria as they are.
     fn changed(&self, nominal: &Self) -> usize {
         self.named.iter().zip(&nominal.named).filter(|(a, b)| a != b).count()
@@ -127,30 +104,40 @@ fn folder(group: &[String], factor: f64) -> String {
 }
 
 /// Whether a factor is applied to it, and the trials can show it.
-fn decides(stage: &str, c: &Criterion) -> bool {
-    let other = OTHER_DATA.iter().any(|s| stage.to_lowercase().contains(s));
-    !other && c.source != Source::Cost && c.scalable
+fn decides(subject: Subject, stage: &str, c: &Criterion) -> bool {
+    subject.reaches(stage) && c.source != Source::Cost && c.scalable
 }
 
 /// The last stages first: they turn evidence into names.
-fn all_that_decide() -> Vec<String> {
+fn all_that_decide(subject: Subject) -> Vec<String> {
     let of = |s: &'static pam_diagnose::criteria::Stage| {
-        s.criteria.iter().filter(|c| decides(s.title, c)).map(|c| c.name.to_owned())
+        s.criteria.iter().filter(move |c| decides(subject, s.title, c)).map(|c| c.name.to_owned())
     };
     PAGE.iter().rev().flat_map(of).collect()
 }
 
-/// The program whose criteria can be scaled. The packages are those of the usual build, so that the features of dependencies agree.
+/// Builds the programs whose criteria can be scaled. The packages are those of the usual build, so that the features of dependencies agree.
 fn build(output: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let target = output.join("build");
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--locked", "--workspace", "--bin", "host", "--target-dir"]);
+    cargo.args([
+        "build",
+        "--quiet",
+        "--release",
+        "--locked",
+        "--workspace",
+        "--bin",
+        "host",
+        "--bin",
+        "trials",
+        "--target-dir",
+    ]);
     let flags = std::env::var("RUSTFLAGS").unwrap_or_default();
     cargo.arg(&target).env("RUSTFLAGS", format!("{flags} --cfg pam_study"));
     if !cargo.status()?.success() {
         return Err("the build for the study failed".into());
     }
-    Ok(target.join("release/host"))
+    Ok(target.join("release"))
 }
 
 /// The environment in which the study's program scales criteria. Its threads are left to the trials beside it.
@@ -163,62 +150,33 @@ fn environment(group: &[String], factor: f64) -> Vec<(&'static str, String)> {
     all
 }
 
-/// A folder that shares the set's trials and truths and has answers of its own.
-fn share(set: &Path, to: &Path) -> Result<(), Box<dyn Error>> {
-    if to.join("ledger.json").exists() {
-        return Ok(());
-    }
-    std::fs::create_dir_all(to)?;
-    let set = set.canonicalize()?;
-    for part in ["trials", "sealed"] {
-        let link = to.join(part);
-        if !link.exists() {
-            std::os::unix::fs::symlink(set.join(part), link)?;
-        }
-    }
-    let ledger = Ledger {
-        answers: Vec::new(),
-        tool: String::new(),
-        seconds: Vec::new(),
-        ..ledger::read_ledger(&set)?
-    };
-    ledger::write_ledger(to, &ledger)
-}
-
-fn outcomes(dir: &Path) -> Result<Vec<Outcome>, Box<dyn Error>> {
-    let ledger = ledger::read_ledger(dir)?;
-    (0..ledger.answers.len())
-        .map(|id| {
-            let answer = answer::frozen(dir, &ledger, id)?;
-            Ok(score::judge(&ledger::open(dir, &ledger, id)?, &answer, 0.0, None))
-        })
-        .collect()
-}
-
 /// The rows that have been measured, and what has not been for lack of time.
 struct Measurements<'a> {
     answering: &'a Answering,
-    host: PathBuf,
+    subject: Subject,
+    /// Directory of `host` and `trials`, built with `--cfg pam_study`.
+    programs: PathBuf,
     until: Option<Instant>,
 }
 
 impl<'a> Measurements<'a> {
-    /// Begins or continues a study: measures the answers with the criteria as they are.
-    fn begin(answering: &'a Answering) -> Result<(Self, Row), Box<dyn Error>> {
-        std::fs::create_dir_all(&answering.output)?;
-        let host = answering.host.clone().map_or_else(|| build(&answering.output), Ok)?;
-        let measurements = Self { answering, host, until: None };
+    /// Begins or continues a study of some trials: measures the answers with the criteria as they are.
+    fn begin(
+        answering: &'a Answering,
+        subject: Subject,
+        programs: &Path,
+    ) -> Result<(Self, Row), Box<dyn Error>> {
+        let measurements = Self { answering, subject, programs: programs.into(), until: None };
         let nominal = measurements.row(&[], 1.0)?.ok_or(UNMEASURED)?;
-        let begun_with = ledger::read_ledger(&answering.output.join(folder(&[], 1.0)))?.tool;
-        if begun_with != answer::version(&measurements.host) {
-            return Err("this study was begun with another program; name that one with --host, or choose another output directory".into());
+        if nominal.tool != answer::version(&programs.join("host")) {
+            return Err("this study was begun with another program; name its directory with --programs, or choose another output directory".into());
         }
         Ok((measurements, nominal))
     }
 
     /// The answers with a group of criteria scaled; read again where they have been measured. None where the time is over.
     fn row(&self, group: &[String], factor: f64) -> Result<Option<Row>, Box<dyn Error>> {
-        let dir = self.answering.output.join(folder(group, factor));
+        let dir = self.answering.output.join(self.subject.folder()).join(folder(group, factor));
         let label = if group.is_empty() { "nominal".to_owned() } else { group.join(",") };
         let kept = dir.join("row.json");
         if let Ok(text) = std::fs::read_to_string(&kept) {
@@ -236,19 +194,13 @@ impl<'a> Measurements<'a> {
             return Ok(None);
         }
         let start = Instant::now();
-        share(&self.answering.set, &dir)?;
-        if ledger::read_ledger(&dir)?.answers.is_empty() {
-            let limit = Duration::from_secs(self.answering.limit);
-            let environment = environment(group, factor);
-            answer::ask(
-                &dir,
-                &Asking { host: self.host.clone(), limit, until: None, tables: false, environment },
-            )?;
-        }
-        let row = Row::of(&label, factor, &outcomes(&dir)?);
+        let answered = self.subject.answer(self, &dir, &environment(group, factor))?;
+        let tool = answer::version(&self.programs.join("host"));
+        let row = Row { criterion: label.clone(), factor, tool, ..answered };
         std::fs::write(&kept, serde_json::to_string_pretty(&row)?)?;
         println!(
-            "{label} × {factor}: false alarms {} of {}, class right {} of {} ({:.0} s)",
+            "{}: {label} × {factor}: false alarms {} of {}, class right {} of {} ({:.0} s)",
+            self.subject.folder(),
             row.false_alarms,
             row.nulls,
             row.class_right,
@@ -292,29 +244,56 @@ fn check_names(names: &[String]) -> Result<(), Box<dyn Error>> {
     }
 }
 
+/// The rows of some trials.
+struct Table {
+    subject: Subject,
+    nominal: Row,
+    /// Each criterion at half and at double its value.
+    rows: Vec<(Row, Row)>,
+    /// Criteria that have not been measured.
+    open: Vec<String>,
+}
+
+impl Study {
+    fn table(
+        &self,
+        subject: Subject,
+        programs: &Path,
+        until: Option<Instant>,
+    ) -> Result<Table, Box<dyn Error>> {
+        let (measurements, nominal) = Measurements::begin(&self.answering, subject, programs)?;
+        let measurements = Measurements { until, ..measurements };
+        let all = all_that_decide(subject);
+        let (names, size) = match self.criterion.as_slice() {
+            [] => (all, GROUP),
+            some => (some.iter().filter(|c| all.contains(c)).cloned().collect(), 1),
+        };
+        let (mut rows, mut open) = (Vec::new(), Vec::new());
+        for group in names.chunks(size) {
+            let half = measurements.screen(&nominal, group, FACTORS[0])?;
+            let double = measurements.screen(&nominal, group, FACTORS[1])?;
+            for ((name, half), double) in group.iter().zip(half).zip(double) {
+                match (half, double) {
+                    (Some(half), Some(double)) => rows.push((half, double)),
+                    _ => open.push(name.clone()),
+                }
+            }
+        }
+        Ok(Table { subject, nominal, rows, open })
+    }
+}
+
 /// Runs the study and writes `sensitivity.md`.
 pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
     check_names(&study.criterion)?;
     let until = study.minutes.map(|m| Instant::now() + Duration::from_secs_f64(60.0 * m.max(0.0)));
-    let (measurements, nominal) = Measurements::begin(&study.answering)?;
-    let measurements = Measurements { until, ..measurements };
-    let (names, size) = match study.criterion.as_slice() {
-        [] => (all_that_decide(), GROUP),
-        some => (some.to_vec(), 1),
-    };
-    let (mut rows, mut open) = (Vec::new(), Vec::new());
-    for group in names.chunks(size) {
-        let half = measurements.screen(&nominal, group, FACTORS[0])?;
-        let double = measurements.screen(&nominal, group, FACTORS[1])?;
-        for ((name, half), double) in group.iter().zip(half).zip(double) {
-            match (half, double) {
-                (Some(half), Some(double)) => rows.push((half, double)),
-                _ => open.push(name.clone()),
-            }
-        }
-    }
-    let page = page::markdown(&ledger::read_ledger(&study.answering.set)?, &nominal, &rows, &open);
-    std::fs::write(study.answering.output.join("sensitivity.md"), &page)?;
+    let answering = &study.answering;
+    std::fs::create_dir_all(&answering.output)?;
+    let programs = answering.programs.clone().map_or_else(|| build(&answering.output), Ok)?;
+    let tables: Result<Vec<Table>, _> =
+        Subject::ALL.into_iter().map(|subject| study.table(subject, &programs, until)).collect();
+    let page = page::markdown(&ledger::read_ledger(&answering.set)?, &tables?);
+    std::fs::write(answering.output.join("sensitivity.md"), &page)?;
     if let Some(path) = &study.page {
         std::fs::write(path, &page)?;
     }
@@ -327,9 +306,11 @@ mod tests {
 
     #[test]
     fn the_study_scales_criteria_that_decide_and_no_limit_of_time() {
-        let all = all_that_decide();
+        let all = all_that_decide(Subject::Loops);
         assert!(all.iter().any(|n| n == "FAMILY_ALPHA"), "{all:?}");
         assert!(!all.iter().any(|n| n == "MOST_REPORTED" || n == "NOISE_SAMPLES"), "{all:?}");
+        assert!(all_that_decide(Subject::Changes).iter().any(|n| n == "PRIOR_NONE"));
+        assert!(all_that_decide(Subject::HeldLengths).iter().any(|n| n == "STAIRCASE_TURN"));
         assert!(check_names(&["FAMILY_ALPHA".into()]).is_ok());
         assert!(check_names(&["FAMILY_BETA".into()]).is_err());
     }
@@ -345,6 +326,7 @@ mod tests {
             judged: 1,
             wrong_class: 0,
             unanswered: 0,
+            tool: String::new(),
             named: named.iter().map(|n| vec![(*n).to_owned()]).collect(),
         }
     }
@@ -352,11 +334,11 @@ mod tests {
     #[test]
     fn a_group_that_changes_an_answer_is_halved_until_one_criterion_does() {
         let output = std::env::temp_dir().join(format!("sensitivity-{}", std::process::id()));
-        let answering = Answering { set: PathBuf::new(), output: output.clone(), limit: 1, host: None };
+        let answering = Answering { set: PathBuf::new(), output: output.clone(), limit: 1, programs: None };
         let nominal = row("nominal", 1.0, ["leak", "inertia"]);
         let names: Vec<String> = ["A", "B", "C", "D", "E", "F"].map(String::from).to_vec();
         let measured = |group: &[String], named| {
-            let dir = answering.output.join(folder(group, 2.0));
+            let dir = answering.output.join(Subject::Loops.folder()).join(folder(group, 2.0));
             std::fs::create_dir_all(&dir).unwrap();
             let text = serde_json::to_string(&row(&group.join(","), 2.0, named)).unwrap();
             std::fs::write(dir.join("row.json"), text).unwrap();
@@ -367,8 +349,12 @@ mod tests {
         measured(&names[2..4], changed);
         measured(&names[2..3], changed);
         // D and the group of E and F have not been measured, and the time is over.
-        let measurements =
-            Measurements { answering: &answering, host: PathBuf::new(), until: Some(Instant::now()) };
+        let measurements = Measurements {
+            answering: &answering,
+            subject: Subject::Loops,
+            programs: PathBuf::new(),
+            until: Some(Instant::now()),
+        };
         let mut rows = measurements.screen(&nominal, &names[..4], 2.0).unwrap();
         rows.extend(measurements.screen(&nominal, &names[4..], 2.0).unwrap());
         let found: Vec<_> =

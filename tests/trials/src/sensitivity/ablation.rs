@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Answering, Measurements, Row, UNMEASURED, check_names};
+use super::subjects::Subject;
+use super::{Answering, Measurements, Row, UNMEASURED, build, check_names};
 use crate::ledger::{self, Ledger};
 use crate::rate::Rate;
 
@@ -56,15 +57,18 @@ const fn rule(what: &'static str, criteria: &'static [&'static str], factor: f64
 
 /// Runs the ablation and writes `ablation.md`.
 pub fn run(ablation: &Ablation) -> Result<(), Box<dyn Error>> {
-    let (measurements, nominal) = Measurements::begin(&ablation.answering)?;
+    let answering = &ablation.answering;
+    std::fs::create_dir_all(&answering.output)?;
+    let programs = answering.programs.clone().map_or_else(|| build(&answering.output), Ok)?;
+    let (measurements, nominal) = Measurements::begin(answering, Subject::Loops, &programs)?;
     let mut rows = Vec::new();
     for rule in &RULES {
         let group: Vec<String> = rule.criteria.iter().map(|c| (*c).to_owned()).collect();
         check_names(&group)?;
         rows.push((rule, measurements.row(&group, rule.factor)?.ok_or(UNMEASURED)?));
     }
-    let page = markdown(&ledger::read_ledger(&ablation.answering.set)?, &nominal, &rows);
-    std::fs::write(ablation.answering.output.join("ablation.md"), &page)?;
+    let page = markdown(&ledger::read_ledger(&answering.set)?, &nominal, &rows);
+    std::fs::write(answering.output.join("ablation.md"), &page)?;
     if let Some(path) = &ablation.page {
         std::fs::write(path, &page)?;
     }

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use pam_diagnose::criteria::{Criterion, PAGE, Stage};
 
-use super::{GROUP, Row};
+use super::subjects::UNREACHED;
+use super::{GROUP, Row, Table};
 use crate::ledger::Ledger;
 use crate::rate::Rate;
 
@@ -13,39 +14,54 @@ fn criterion(name: &str) -> Option<&'static Criterion> {
     PAGE.iter().flat_map(|s| s.criteria).find(|c| c.name == name)
 }
 
-/// The table of all criteria that change an answer, those that change none, and those that have not been measured.
-pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &[String]) -> String {
+/// The tables of all criteria that change an answer, those that change none, and those that have not been measured.
+pub(super) fn markdown(set: &Ledger, tables: &[Table]) -> String {
     let protocol = set.protocol.as_ref().map_or(String::new(), |p| format!(" --protocol {p}"));
+    let take = tables.first().map_or(0, |t| t.nominal.named.len());
     let mut m = format!(
         "# Sensitivity of the diagnosis to its criteria\n\n\
-         Each [criterion](criteria.md) at half and at double its value, on the same trials of a development set of the \
-         virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and more whose first name is of the right class. \
-         \"Answers changed\" counts trials that name something else than with the criteria as they are.\n\n\
+         Each [criterion](criteria.md) at half and at double its value, on the same trials of the virtual bench. Criteria of \
+         comparisons with a reference are measured on pairs of campaigns, those of isometric campaigns on muscles at held length, all others on \
+         force-stroke loops.\n\n\
          ```text\n\
-         cargo run --release -p trials -- generate --set {} --n {}{protocol} --take {} -o SET\n\
+         cargo run --release -p trials -- generate --set {} --n {}{protocol} --take {take} -o SET\n\
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
          These commands wrote this page. Criteria are scaled in groups of {GROUP} at first. Where a group changes no answer, none of its \
          criteria is counted as changing one; this misses two that cancel each other. Where it changes one, the group is halved until \
-         the criteria are found that change an answer alone. The set is public, and the criteria were chosen with such sets: the table shows how much depends \
-         on each of them, not how good they are.\n\n",
-        set.set,
-        set.drawn,
-        nominal.named.len()
+         the criteria are found that change an answer alone. The sets are public, and the criteria were chosen with such sets: the tables show how \
+         much depends on each of them, not how good they are.\n",
+        set.set, set.drawn,
     );
-    let rate = |k: usize, n: usize| Rate::new(k, n).to_string();
+    for table in tables {
+        section(&mut m, table);
+    }
     let _ = writeln!(
         m,
-        "With the criteria as they are: false alarms {}; class right {}; exact {}; wrong class {}; trials {}.\n",
+        "\n## Not in this study\n\n\
+         Limits of computing time and sizes of arrays are not scaled. No trial here reaches these stages: {}. Doubled, `TABLE_ORDER` exceeds the \
+         largest order of a table, and `KEPT_GAIN` exceeds one: no effect can be named then.",
+        UNREACHED.map(|s| format!("\"{s}\"")).join(", ")
+    );
+    m
+}
+
+fn section(m: &mut String, table: &Table) {
+    let Table { subject, nominal, rows, open } = table;
+    let rate = |k: usize, n: usize| Rate::new(k, n).to_string();
+    let _ = write!(
+        m,
+        "\n## {}\n\n{}\n\n\
+         With the criteria as they are: false alarms {}; class right {}; exact {}; wrong class {}; trials {}.\n\n\
+         | criterion | value | false alarms at ½, ×2 | class right at ½, ×2 | exact at ½, ×2 | wrong class at ½, ×2 | answers changed at ½, ×2 |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+        subject.title(),
+        subject.counted(),
         rate(nominal.false_alarms, nominal.nulls),
         rate(nominal.class_right, nominal.judged),
         rate(nominal.exact, nominal.judged),
         rate(nominal.wrong_class, nominal.judged),
         nominal.named.len()
-    );
-    m.push_str(
-        "| criterion | value | false alarms at ½, ×2 | class right at ½, ×2 | exact at ½, ×2 | wrong class at ½, ×2 | answers changed at ½, ×2 |\n\
-         | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let (mut moving, still): (Vec<_>, Vec<_>) =
         rows.iter().partition(|(half, double)| half.changed(nominal) + double.changed(nominal) > 0);
@@ -77,17 +93,11 @@ pub(super) fn markdown(set: &Ledger, nominal: &Row, rows: &[(Row, Row)], open: &
             let _ = writeln!(m, "| {} | {without} | {not_measured} |", stage.title);
         }
     }
-    m.push_str(
-        "\nDoubled, `TABLE_ORDER` exceeds the largest order of a table, and `KEPT_GAIN` exceeds one: no effect can be named then. \
-         Not in this study are limits of computing time and sizes of arrays. Loops of the virtual bench do not reach criteria of comparisons \
-         with a reference, campaigns over months, isometric runs, and stocks. Nor do they reach those of proposed recordings and of a \
-         table's health on a controller.\n",
-    );
-    m
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::subjects::Subject;
     use super::super::tests::row;
     use super::*;
 
@@ -108,7 +118,9 @@ mod tests {
             tool: String::new(),
             seconds: Vec::new(),
         };
-        let page = markdown(&set, &nominal, &rows, &["LEAST_SCORE".into()]);
+        let table =
+            Table { subject: Subject::Loops, nominal, rows: rows.into(), open: vec!["LEAST_SCORE".into()] };
+        let page = markdown(&set, &[table]);
         assert!(page.contains("generate --set dev --n 345 --protocol A --take 2 -o SET"), "{page}");
         assert!(page.contains("| `ALPHA` |  | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
         assert!(page.contains("| `FAMILY_ALPHA` | `LEAST_SCORE` |"), "{page}");
