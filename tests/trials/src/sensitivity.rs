@@ -50,6 +50,9 @@ pub struct Study {
     /// These criteria only, in this order, each alone; all that decide a verdict otherwise, in groups.
     #[arg(long, value_name = "NAME")]
     criterion: Vec<String>,
+    /// Only these trials; the page keeps its sections of the others.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    only: Vec<Subject>,
     /// Begin no further row after this many minutes; the same command continues later.
     #[arg(long)]
     minutes: Option<f64>,
@@ -290,12 +293,17 @@ pub fn run(study: &Study) -> Result<(), Box<dyn Error>> {
     let answering = &study.answering;
     std::fs::create_dir_all(&answering.output)?;
     let programs = answering.programs.clone().map_or_else(|| build(&answering.output), Ok)?;
-    let tables: Result<Vec<Table>, _> =
-        Subject::ALL.into_iter().map(|subject| study.table(subject, &programs, until)).collect();
-    let page = page::markdown(&ledger::read_ledger(&answering.set)?, &tables?);
-    std::fs::write(answering.output.join("sensitivity.md"), &page)?;
+    let wanted = |s: &Subject| study.only.is_empty() || study.only.contains(s);
+    let tables: Result<Vec<Table>, _> = Subject::ALL
+        .into_iter()
+        .filter(wanted)
+        .map(|subject| study.table(subject, &programs, until))
+        .collect();
+    let (set, tables) = (ledger::read_ledger(&answering.set)?, tables?);
+    std::fs::write(answering.output.join("sensitivity.md"), page::markdown(&set, &tables, ""))?;
     if let Some(path) = &study.page {
-        std::fs::write(path, &page)?;
+        let earlier = std::fs::read_to_string(path).unwrap_or_default();
+        std::fs::write(path, page::markdown(&set, &tables, &earlier))?;
     }
     Ok(())
 }

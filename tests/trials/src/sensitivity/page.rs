@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use pam_diagnose::criteria::{Criterion, PAGE, Stage};
 
-use super::subjects::UNREACHED;
+use super::subjects::{Subject, UNREACHED};
 use super::{GROUP, Row, Table};
 use crate::ledger::Ledger;
 use crate::rate::Rate;
@@ -14,36 +14,51 @@ fn criterion(name: &str) -> Option<&'static Criterion> {
     PAGE.iter().flat_map(|s| s.criteria).find(|c| c.name == name)
 }
 
-/// The tables of all criteria that change an answer, those that change none, and those that have not been measured.
-pub(super) fn markdown(set: &Ledger, tables: &[Table]) -> String {
+/// The tables of all criteria that change an answer, those that change none, and those that have not been measured. Trials that were
+/// not answered now keep their section of an earlier page.
+pub(super) fn markdown(set: &Ledger, tables: &[Table], earlier: &str) -> String {
     let protocol = set.protocol.as_ref().map_or(String::new(), |p| format!(" --protocol {p}"));
-    let take = tables.first().map_or(0, |t| t.nominal.named.len());
     let mut m = format!(
         "# Sensitivity of the diagnosis to its criteria\n\n\
          Each [criterion](criteria.md) at half and at double its value, on the same trials of the virtual bench. Criteria of \
          comparisons with a reference are measured on pairs of campaigns, those of isometric campaigns on muscles at held length, all others on \
          force-stroke loops.\n\n\
          ```text\n\
-         cargo run --release -p trials -- generate --set {} --n {}{protocol} --take {take} -o SET\n\
+         cargo run --release -p trials -- generate --set {} --n {}{protocol} --take {} -o SET\n\
          cargo run --release -p trials -- sensitivity SET -o DIR --page docs/src/sensitivity.md\n\
          ```\n\n\
          These commands wrote this page. Criteria are scaled in groups of {GROUP} at first. Where a group changes no answer, none of its \
          criteria is counted as changing one; this misses two that cancel each other. Where it changes one, the group is halved until \
          the criteria are found that change an answer alone. The sets are public, and the criteria were chosen with such sets: the tables show how \
          much depends on each of them, not how good they are.\n",
-        set.set, set.drawn,
+        set.set,
+        set.drawn,
+        set.truths.len()
     );
-    for table in tables {
-        section(&mut m, table);
+    for subject in Subject::ALL {
+        match tables.iter().find(|t| t.subject == subject) {
+            Some(table) => section(&mut m, table),
+            None => m.push_str(section_of(earlier, subject)),
+        }
     }
     let _ = writeln!(
         m,
-        "\n## Not in this study\n\n\
+        "\n{NOT_MEASURED}\n\n\
          Limits of computing time and sizes of arrays are not scaled. No trial here reaches these stages: {}. Doubled, `TABLE_ORDER` exceeds the \
          largest order of a table, and `KEPT_GAIN` exceeds one: no effect can be named then.",
         UNREACHED.map(|s| format!("\"{s}\"")).join(", ")
     );
     m
+}
+
+/// The last section.
+const NOT_MEASURED: &str = "## Not in this study";
+
+/// The section of some trials in an earlier page, with the line break before it; empty where the page has none.
+fn section_of(page: &str, subject: Subject) -> &str {
+    let Some(start) = page.find(&format!("\n## {}\n", subject.title())) else { return "" };
+    let end = page[start + 1..].find("\n## ").map_or(page.len(), |n| start + 1 + n);
+    &page[start..end]
 }
 
 fn section(m: &mut String, table: &Table) {
@@ -97,7 +112,6 @@ fn section(m: &mut String, table: &Table) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::subjects::Subject;
     use super::super::tests::row;
     use super::*;
 
@@ -111,7 +125,7 @@ mod tests {
         let set = Ledger {
             set: "dev".into(),
             seed_sha256: String::new(),
-            truths: Vec::new(),
+            truths: vec![String::new(); 2],
             drawn: 345,
             protocol: Some("A".into()),
             answers: Vec::new(),
@@ -120,9 +134,17 @@ mod tests {
         };
         let table =
             Table { subject: Subject::Loops, nominal, rows: rows.into(), open: vec!["LEAST_SCORE".into()] };
-        let page = markdown(&set, &[table]);
+        let page = markdown(&set, &[table], "");
         assert!(page.contains("generate --set dev --n 345 --protocol A --take 2 -o SET"), "{page}");
         assert!(page.contains("| `ALPHA` |  | 0, 0 | 1, 1 | 1, 1 | 0, 0 | 1, 0 |"), "{page}");
         assert!(page.contains("| `FAMILY_ALPHA` | `LEAST_SCORE` |"), "{page}");
+        // Trials that are not answered again keep their section, byte for byte, between the others.
+        let nominal = row("nominal", 1.0, ["leak", "inertia"]);
+        let changes = Table { subject: Subject::Changes, nominal, rows: Vec::new(), open: Vec::new() };
+        let both = markdown(&set, &[changes], &page);
+        let kept = section_of(&both, Subject::Loops);
+        assert_eq!(kept, section_of(&page, Subject::Loops));
+        assert!(kept.contains("`ALPHA`") && both.contains("## Changes between two campaigns"), "{both}");
+        assert_eq!(both.matches(NOT_MEASURED).count(), 1);
     }
 }

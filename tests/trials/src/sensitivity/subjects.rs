@@ -14,7 +14,7 @@ use crate::spec::Stratum;
 use crate::{held_length, reference_bench};
 
 /// A kind of trials.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Subject {
     /// Force-stroke loops of the virtual bench: the development set that the study was given.
     Loops,
@@ -68,7 +68,7 @@ impl Subject {
     /// What is counted there.
     pub(super) fn counted(self) -> String {
         match self {
-            Self::Loops => "Trials of a development set of the virtual bench. \"Class right\" counts visible effects of 2 % of the blocked force and \
+            Self::Loops => "The trials of SET. \"Class right\" counts visible effects of 2 % of the blocked force and \
                 more whose first name is of the right class. \"Answers changed\" counts trials that name something else than with the criteria as \
                 they are."
                 .into(),
