@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use crate::bench::Candidate;
 use crate::confidence_band::ConfidenceBand;
 use crate::fit::points::HeldMounting;
+use crate::fit::screen::clip;
 use crate::table_file::{Correction, StoredMounting, TableFile};
 use crate::vented_rest;
 use pam_data::error::{DataCode, Error, Result};
@@ -32,7 +33,7 @@ use pam_data::statistics::NORMAL_95;
 pub struct Prediction {
     /// The recordings in the campaign's order.
     pub recordings: Vec<Predicted>,
-    /// Root mean square of `F − F_model` over all rows that have a force, N; `None` where none has.
+    /// Root mean square of `F − F_model` over all scored rows, N; `None` where there is none.
     pub rms: Option<f64>,
     /// Warnings: excluded readings, extrapolation.
     pub warnings: Vec<String>,
@@ -43,9 +44,14 @@ pub struct Prediction {
 pub struct Predicted {
     /// The force that the load cell would read, N, per row.
     pub force: Vec<f64>,
-    /// Root mean square of `F − F_model` over rows without sensor failures, N; `None` without a force column, and where the whole
-    /// recording is in another unit than the others ([`pam_data::recording::dropouts`]).
+    /// Root mean square of `F − F_model` over the scored rows, N; `None` where none is scored. Not scored are rows without a force, rows
+    /// with a failed sensor ([`pam_data::recording::dropouts`]), and readings at an end of the force sensor's range that the model
+    /// agrees with: beyond the upper end, or below the lower one or slack.
     pub rms: Option<f64>,
+    /// The number of scored rows.
+    pub scored: usize,
+    /// The number of readings at an end of the force sensor's range that are not scored.
+    pub at_limit: usize,
     /// The uncertainty, where it was requested and the table holds it.
     pub bands: Option<Bands>,
 }
@@ -57,7 +63,7 @@ pub struct Bands {
     pub half: Vec<f64>,
     /// Its mean, N.
     pub mean: f64,
-    /// The share of measured forces within the 95 % interval of single readings, which include the residuals of the fit;
+    /// The share of scored forces within the 95 % interval of single readings, which include the residuals of the fit;
     /// `None` without a force column.
     pub inside: Option<f64>,
 }
@@ -79,7 +85,64 @@ pub fn predict_with_bands(file: &TableFile, campaign: &Campaign) -> Result<Predi
     run(file, campaign, ConfidenceBand::of(file).as_ref())
 }
 
-fn bands(band: &ConfidenceBand, recording: &Recording, motion: &Motion, force: &[f64]) -> Bands {
+/// The ends of the force sensor's range that the readings show, N.
+struct Limits {
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+/// The errors of a prediction in one recording.
+struct Errors {
+    /// Sum of the squared errors of the scored rows, N².
+    square: f64,
+    scored: usize,
+    at_limit: usize,
+    /// Whether a row is scored.
+    counts: Vec<bool>,
+}
+
+impl Limits {
+    fn of(campaign: &Campaign) -> Self {
+        let (low, high) = clip(campaign);
+        Self { low: low.map(|c| c.force), high: high.map(|c| c.force) }
+    }
+
+    /// The error of a reading, N. A reading at an end of the sensor's range only bounds the force: `None` where the model agrees with the
+    /// bound. At the lower end a slack muscle agrees, whatever the sensor reads of it.
+    fn error(&self, reading: f64, model: f64) -> Option<f64> {
+        let over = if self.low == Some(reading) {
+            model - reading.max(0.0)
+        } else if self.high == Some(reading) {
+            reading - model
+        } else {
+            return Some(reading - model);
+        };
+        (over > 0.0).then_some(over)
+    }
+
+    fn errors(&self, recording: &Recording, model: &[f64], read: &[bool]) -> Errors {
+        let mut errors = Errors { square: 0.0, scored: 0, at_limit: 0, counts: vec![false; model.len()] };
+        for (i, reading) in recording.force.iter().flatten().enumerate().filter(|(i, _)| read[*i]) {
+            match self.error(*reading, model[i]) {
+                Some(error) => {
+                    errors.square += error.powi(2);
+                    errors.scored += 1;
+                    errors.counts[i] = true;
+                }
+                None => errors.at_limit += 1,
+            }
+        }
+        errors
+    }
+}
+
+fn bands(
+    band: &ConfidenceBand,
+    recording: &Recording,
+    motion: &Motion,
+    force: &[f64],
+    scored: &[bool],
+) -> Bands {
     let at = |i: usize| (recording.pressure[i], recording.stroke[i], f64::from(motion.direction[i]));
     let stds = (0..recording.len()).into_par_iter().map(|i| {
         let (pressure, stroke, direction) = at(i);
@@ -88,7 +151,8 @@ fn bands(band: &ConfidenceBand, recording: &Recording, motion: &Motion, force: &
     let stds: Vec<f64> = stds.collect();
     let inside = recording.force.as_ref().map(|measured| {
         let near = |i: &usize| (measured[*i] - force[*i]).abs() <= NORMAL_95 * band.with_scatter(stds[*i]);
-        (0..measured.len()).filter(near).count() as f64 / measured.len().max(1) as f64
+        let rows = || (0..measured.len()).filter(|i| scored[*i]);
+        rows().filter(near).count() as f64 / rows().count().max(1) as f64
     });
     let half: Vec<f64> = stds.iter().map(|s| NORMAL_95 * s).collect();
     let mean = half.iter().sum::<f64>() / half.len().max(1) as f64;
@@ -107,6 +171,7 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
     check_contractions(&model.muscle, &corrected)?;
     let mut follower = Follower::of(campaign);
     let rests = if vented_rest::matters(&file.table.effects) { campaign.rests() } else { None };
+    let limits = Limits::of(campaign);
     let mut recordings = Vec::with_capacity(campaign.recordings.len());
     let (mut square, mut rows) = (0.0, 0.0);
     for (index, (recording, motion)) in
@@ -124,18 +189,13 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
             }
             model.with_effects(recording, &motions)
         };
-        let read = screened.read(index);
-        let measured = recording.force.as_ref().filter(|_| read.contains(&true));
-        let rms = measured.map(|measured| {
-            let scored = measured.iter().zip(&force).zip(&read).filter(|(_, read)| **read);
-            let sum: f64 = scored.map(|((f, m), _)| (f - m).powi(2)).sum();
-            let count = read.iter().filter(|read| **read).count() as f64;
-            square += sum;
-            rows += count;
-            (sum / count.max(1.0)).sqrt()
-        });
-        let bands = band.map(|band| bands(band, recording, &motion, &force));
-        recordings.push(Predicted { force, rms, bands });
+        let errors = limits.errors(recording, &force, &screened.read(index));
+        square += errors.square;
+        rows += errors.scored as f64;
+        let bands = band.map(|band| bands(band, recording, &motion, &force, &errors.counts));
+        let rms = (errors.scored > 0).then(|| (errors.square / errors.scored as f64).sqrt());
+        let Errors { scored, at_limit, .. } = errors;
+        recordings.push(Predicted { force, rms, scored, at_limit, bands });
     }
     let rms = (rows > 0.0).then(|| (square / rows).sqrt());
     let places: Vec<(f64, f64)> = campaign
@@ -396,5 +456,28 @@ fn cell(name: &str, delimiter: char) -> String {
         format!("\"{}\"", name.replace('"', "\"\""))
     } else {
         name.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_at_an_end_of_the_range_count_only_where_the_model_disagrees() {
+        let limits = Limits { low: Some(-8.0), high: Some(100.0) };
+        // A slack muscle pulls nothing, whatever the offset of the load cell is.
+        assert_eq!(limits.error(-8.0, 0.0), None);
+        assert_eq!(limits.error(-8.0, -20.0), None);
+        assert_eq!(limits.error(-8.0, 3.0), Some(3.0));
+        assert_eq!(limits.error(100.0, 130.0), None);
+        assert_eq!(limits.error(100.0, 90.0), Some(10.0));
+        assert_eq!(limits.error(50.0, 52.0), Some(-2.0));
+        let recording =
+            Recording { force: Some(vec![-8.0, -8.0, 50.0, 100.0, 60.0]), ..Recording::default() };
+        let errors =
+            limits.errors(&recording, &[0.0, 3.0, 46.0, 130.0, 0.0], &[true, true, true, true, false]);
+        assert_eq!((errors.scored, errors.at_limit, errors.square), (2, 2, 25.0));
+        assert_eq!(errors.counts, [false, true, true, false, false]);
     }
 }

@@ -81,6 +81,7 @@ impl Arguments {
                     inside_pct: p.bands.as_ref().map(|b| b.inside.map(|share| 100.0 * share)),
                     rms_N: p.rms,
                     samples: r.len(),
+                    scored: p.scored,
                 })
                 .collect();
             let document = document::Predict { recordings, rms_N: prediction.rms, schema: "pam-predict/1" };
@@ -91,11 +92,19 @@ impl Arguments {
             let rms = p.rms.map_or(unscored.to_owned(), |r| format!("rms {r:.3} N"));
             let band = p.bands.as_ref().map_or(String::new(), |bands| {
                 let inside = bands.inside.filter(|_| p.rms.is_some()).map_or(String::new(), |share| {
-                    format!(", {:.1} % of the readings inside their 95 % interval", 100.0 * share)
+                    format!(", {:.1} % of the readings inside their prediction interval", 100.0 * share)
                 });
-                format!(", force ± {:.3} N (95 %){inside}", bands.mean)
+                format!(", model force ± {:.3} N (95 %){inside}", bands.mean)
             });
-            console.note(format!("{}: {}, {rms}{band}", recording.name, pluralise(recording.len(), "row")));
+            let limit = match p.at_limit {
+                0 => String::new(),
+                n => format!("; not scored: {} at the end of the force sensor's range", pluralise(n, "row")),
+            };
+            console.note(format!(
+                "{}: {}, {rms}{band}{limit}",
+                recording.name,
+                pluralise(recording.len(), "row")
+            ));
         }
         if self.output.is_none() && self.json.is_none() {
             console.detail("nothing written: use -o or --json");

@@ -28,4 +28,7 @@ pub(crate) struct Recording {
     pub inside_pct: Option<Option<f64>>,
     pub rms_N: Option<f64>,
     pub samples: usize,
+    /// Rows behind `rms_N`: those without a failed sensor, and without readings at an end of the force sensor's range that the model
+    /// agrees with.
+    pub scored: usize,
 }
