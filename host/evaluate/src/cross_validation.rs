@@ -6,7 +6,8 @@ use pam_data::error::{Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
-use pam_data::recording::{Campaign, Recording, largest_force};
+use pam_data::recording::{Campaign, HELD, Recording, largest_force};
+use pam_data::statistics::extremes;
 use pam_fit::error::FitCode;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{self, About, TableFile};
@@ -105,6 +106,11 @@ impl Tally {
 pub struct CrossValidation {
     /// The errors of the table.
     pub table: Score,
+    /// Of these, the errors at contractions between others: interpolation. `None` where runs are left out, or only two contractions were
+    /// held.
+    pub between: Option<Score>,
+    /// The errors at the smallest and the largest contraction: extrapolation. `None` where runs are left out.
+    pub ends: Option<Score>,
     /// The errors of a published formula on the same rows, where one was given.
     pub published: Option<Score>,
     /// The errors of the table by place.
@@ -126,6 +132,11 @@ pub fn as_file(fit: &Fit) -> TableFile {
     TableFile { table: fit.table.clone(), about: About { mountings, ..About::default() } }
 }
 
+/// The mean stroke of a recording, m.
+fn middle(recording: &Recording) -> f64 {
+    recording.stroke.iter().sum::<f64>() / recording.len().max(1) as f64
+}
+
 fn key(recording: &Recording, index: usize, split: Split) -> String {
     match split {
         Split::Run => {
@@ -133,8 +144,7 @@ fn key(recording: &Recording, index: usize, split: Split) -> String {
             label.map_or_else(|| format!("{} ({})", recording.title(), index + 1), |(_, v)| v.clone())
         }
         Split::Contraction => {
-            let middle = recording.stroke.iter().sum::<f64>() / recording.len().max(1) as f64;
-            format!("{:.1} mm", middle * 1e3)
+            format!("{:.1} mm", middle(recording) * 1e3)
         }
     }
 }
@@ -142,7 +152,7 @@ fn key(recording: &Recording, index: usize, split: Split) -> String {
 /// Leaves each run or contraction out in turn, fits the others, and scores the prediction of what was left out.
 ///
 /// # Errors
-/// [`FitCode::FitUnderdetermined`] with fewer than two groups, or a fit that fails.
+/// [`FitCode::FitUnderdetermined`] with fewer than two groups, contractions of a muscle that moves, or a fit that fails.
 pub fn cross_validate(
     campaign: &Campaign,
     muscle: &MuscleDescription,
@@ -151,6 +161,13 @@ pub fn cross_validate(
     published: Option<&Published>,
 ) -> Result<CrossValidation> {
     let keys: Vec<String> = campaign.recordings.iter().enumerate().map(|(i, r)| key(r, i, split)).collect();
+    if split == Split::Contraction && campaign.recordings.iter().any(|r| r.held_stroke().is_none()) {
+        return Err(Error::new(
+            FitCode::FitUnderdetermined,
+            "contractions are left out where every recording has a held length, and here the muscle moves",
+        )
+        .help("leave runs out instead"));
+    }
     let mut values = keys.clone();
     values.sort();
     values.dedup();
@@ -166,6 +183,8 @@ pub fn cross_validate(
     let blocked = f64::from(whole.table.blocked_force.newtons());
     let mut out = CrossValidation {
         table: Score::default(),
+        between: None,
+        ends: None,
         published: None,
         spots: Vec::new(),
         blocked,
@@ -176,6 +195,7 @@ pub fn cross_validate(
     let mut sums = vec![ResidualSums::default(); campaign.recordings.len()];
     let mut reference = Score::default();
     let mut tally = Tally::default();
+    let (low, high) = extremes(campaign.recordings.iter().map(middle));
     for value in &values {
         let part = |inside: bool| Campaign {
             recordings: campaign
@@ -198,6 +218,9 @@ pub fn cross_validate(
             test.recordings.iter().zip(&prediction.recordings).zip(motions.iter().zip(index)).enumerate()
         {
             let read = screened.read(k);
+            let inner = [low, high].iter().all(|end| (middle(recording) - end).abs() > HELD);
+            let place = if inner { &mut out.between } else { &mut out.ends };
+            let mut place = (split == Split::Contraction).then(|| place.get_or_insert_default());
             let measured = recording.require_force()?;
             for (i, force) in measured.iter().enumerate() {
                 // A saturated or failed sensor does not measure the force.
@@ -208,6 +231,9 @@ pub fn cross_validate(
                 let contraction = recording.stroke[i] / muscle.rest_length();
                 sums[index].add(1.0, residual);
                 tally.add(value, contraction, motion.direction[i], residual);
+                if let Some(place) = &mut place {
+                    place.add(residual);
+                }
                 if let Some(p) = published {
                     reference.add(force - p.force(muscle, recording.pressure[i], contraction));
                 }

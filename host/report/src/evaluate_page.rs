@@ -59,7 +59,10 @@ pub fn page(all: &[Evaluated<'_>], published: Option<&str>) -> Page {
 /// Mean errors over all muscles, percent of the largest measured force of each.
 struct Means {
     runs: Option<f64>,
+    /// At contractions between others.
     contractions: Option<f64>,
+    /// At the smallest and the largest contraction.
+    ends: Option<f64>,
     lengths: Option<f64>,
     published: Option<f64>,
 }
@@ -72,7 +75,8 @@ impl Means {
         };
         Self {
             runs: mean(&|e| e.runs.map(|r| e.percent(&r.table))),
-            contractions: mean(&|e| e.contractions.map(|c| e.percent(&c.table))),
+            contractions: mean(&|e| e.contractions.and_then(|c| c.between).map(|c| e.percent(&c))),
+            ends: mean(&|e| e.contractions.and_then(|c| c.ends).map(|c| e.percent(&c))),
             lengths: mean(&|e| e.length.map(|l| e.percent(&l.score))),
             published: mean(&|e| e.any().and_then(|a| a.published).map(|p| e.percent(&p))),
         }
@@ -80,7 +84,7 @@ impl Means {
 
     /// The error that decides, with what was held out: a table is used at contractions between those that were recorded.
     fn worst(&self) -> (f64, &'static str) {
-        let held = [(self.runs, "runs"), (self.contractions, "contractions")];
+        let held = [(self.runs, "runs"), (self.contractions, "contractions between others")];
         let known = held.into_iter().filter_map(|(v, what)| Some((v?, what)));
         known.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NAN, "runs"))
     }
@@ -107,18 +111,14 @@ fn header(page: &mut Page, all: &[Evaluated<'_>], means: &Means) {
     }
     page.verdict(tone(worst), verdict);
     let shown = [
-        ("held-out runs", means.runs),
-        ("held-out contractions", means.contractions),
-        ("other lengths", means.lengths),
+        ("held-out runs", means.runs, "mean error, of the largest force"),
+        ("held-out contractions", means.contractions, "between others: mean error, of the largest force"),
+        ("end contractions", means.ends, "extrapolation: mean error, of the largest force"),
+        ("other lengths", means.lengths, "mean error, of the largest force"),
     ];
-    for (label, value) in shown {
+    for (label, value, meaning) in shown {
         if let Some(value) = value {
-            page.fact(
-                label,
-                format!("{} %", significant(value, 2)),
-                "mean error, of the largest force",
-                tone(value),
-            );
+            page.fact(label, format!("{} %", significant(value, 2)), meaning, tone(value));
         }
     }
     if let ([one], true) = (all, page.facts.len() < 3)
@@ -192,10 +192,10 @@ fn by_muscle(all: &[Evaluated<'_>]) -> Figure {
     )
     .points("held-out runs", Colour::Series(0), &x, &of(&|e| e.runs.map(|r| e.percent(&r.table))))
     .rings(
-        "held-out contractions",
+        "contractions between others",
         Colour::Series(1),
         &x,
-        &of(&|e| e.contractions.map(|c| e.percent(&c.table))),
+        &of(&|e| e.contractions.and_then(|c| c.between).map(|c| e.percent(&c))),
     )
     .crosses("other lengths", Colour::Series(2), &x, &of(&|e| e.length.map(|l| e.percent(&l.score))))
     .points(
@@ -222,7 +222,8 @@ fn scores(all: &[Evaluated<'_>], published: Option<&str>) -> Section {
             "blocked force (N)",
             "held-out runs",
             "published formula",
-            "held-out contractions",
+            "contractions between others",
+            "end contractions",
             "other lengths",
             "held-out contractions, with the stock",
             "other lengths, with the stock",
@@ -241,7 +242,8 @@ fn scores(all: &[Evaluated<'_>], published: Option<&str>) -> Section {
             fixed(any.blocked, 1),
             cell(one.runs.map(|r| &r.table)),
             cell(any.published.as_ref()),
-            cell(one.contractions.map(|c| &c.table)),
+            cell(one.contractions.and_then(|c| c.between.as_ref())),
+            cell(one.contractions.and_then(|c| c.ends.as_ref())),
             cell(one.length.map(|l| &l.score)),
             cell(one.stock.map(|s| &s.contractions).filter(|s| s.rows > 0.0)),
             cell(one.stock.map(|s| &s.length)),

@@ -35,6 +35,10 @@ pub(crate) struct Muscle {
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct HeldOut {
     pub table: Score,
+    /// Of these, at contractions between others: interpolation. Null where runs are left out.
+    pub between: Option<Score>,
+    /// At the smallest and the largest contraction: extrapolation. Null where runs are left out.
+    pub ends: Option<Score>,
     /// Of the published formula on the same rows.
     pub published: Option<Score>,
     pub r#where: Vec<Spot>,

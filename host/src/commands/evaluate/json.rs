@@ -37,6 +37,8 @@ pub(super) fn to_document(
     let held = |h: &Option<CrossValidation>| {
         h.as_ref().map(|h| document::HeldOut {
             table: score(&h.table),
+            between: h.between.as_ref().map(score),
+            ends: h.ends.as_ref().map(score),
             published: h.published.as_ref().map(score),
             r#where: spots(&h.spots),
             recordings: json_of(&h.recordings),

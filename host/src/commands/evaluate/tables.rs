@@ -16,20 +16,28 @@ pub(super) fn to_text(
 ) -> String {
     let mut text = format!(
         "Errors on held-out data: mean |F − F_model| in N, and in percent of the largest measured force (F_max).\n\
-         {:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
-        "muscle", "F_max N", "F_B N", "held-out runs", "same, published", "held-out contr.", "other lengths"
+         {:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17} {:>17}\n",
+        "muscle",
+        "F_max N",
+        "F_B N",
+        "held-out runs",
+        "same, published",
+        "between contr.",
+        "at end contr.",
+        "other lengths"
     );
     let cell = |s: Option<&Score>, blocked: f64| {
         s.map_or("–".to_owned(), |s| format!("{:.2} N  {:.2} %", s.mean(), percent(s, blocked).0))
     };
-    let mut sums = [(0.0, 0.0); 4];
+    let mut sums = [(0.0, 0.0); 5];
     for (case, length) in cases.iter().zip(lengths) {
         let Some(any) = case.runs.as_ref().or(case.contractions.as_ref()) else { continue };
         let (b, blocked) = (any.largest, any.blocked);
         let columns = [
             case.runs.as_ref().map(|h| h.table),
             any.published,
-            case.contractions.as_ref().map(|h| h.table),
+            case.contractions.as_ref().and_then(|h| h.between),
+            case.contractions.as_ref().and_then(|h| h.ends),
             length.as_ref().map(|l| l.score),
         ];
         for (sum, c) in sums.iter_mut().zip(&columns) {
@@ -38,20 +46,25 @@ pub(super) fn to_text(
             }
         }
         text += &format!(
-            "{:<22} {b:8.1} {blocked:8.1} {:>17} {:>17} {:>17} {:>17}\n",
+            "{:<22} {b:8.1} {blocked:8.1} {:>17} {:>17} {:>17} {:>17} {:>17}\n",
             case.muscle.name,
             cell(columns[0].as_ref(), b),
             cell(columns[1].as_ref(), b),
             cell(columns[2].as_ref(), b),
-            cell(columns[3].as_ref(), b)
+            cell(columns[3].as_ref(), b),
+            cell(columns[4].as_ref(), b)
         );
     }
     let means: Vec<String> =
         sums.iter().map(|(s, n)| if *n > 0.0 { format!("{:.2} %", s / n) } else { "–".into() }).collect();
     text += &format!(
-        "{:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17}\n",
-        "mean", "", "", means[0], means[1], means[2], means[3]
+        "{:<22} {:>8} {:>8} {:>17} {:>17} {:>17} {:>17} {:>17}\n",
+        "mean", "", "", means[0], means[1], means[2], means[3], means[4]
     );
+    if cases.iter().any(|case| case.contractions.is_some()) {
+        text += "between contr.: each held contraction between others left out in turn; at end contr.: the smallest and the largest one, \
+                 which is extrapolation\n";
+    }
     if let Some(name) = published {
         text += &format!("published: {name}, on the rows of the first column\n");
     }
