@@ -45,6 +45,7 @@ mod change_point;
 mod confirmation;
 pub mod criteria;
 mod cross_validation;
+mod description;
 mod diagnosis;
 pub mod experiment;
 mod findings;
@@ -85,6 +86,7 @@ pub mod verdict;
 pub mod why;
 pub mod why_not;
 
+pub use description::diagnose_described;
 pub use diagnosis::diagnose;
 pub use options::Options;
 pub use verdict::Diagnosis;

@@ -33,6 +33,21 @@ pub enum Unjudgeable {
         /// Root mean square of the measured force, N.
         measured: f64,
     },
+    /// No muscle makes these recordings: their units, signs or zeros, or the description of the muscle, are wrong. In the fit's words.
+    Implausible(String),
+}
+
+/// A dimension of the muscle with which nothing is left to explain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dimension {
+    /// Its name in the description.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// The described value.
+    pub described: f64,
+    /// The value with which the model agrees with the recordings.
+    pub fitted: f64,
 }
 
 /// How friction acts while the length is held.
@@ -171,6 +186,8 @@ pub enum Remark {
     NotRepeatable(Scatter),
     /// A gain or offset outside the known range, as a wrong muscle description imitates it.
     CheckDescription(String),
+    /// With these dimensions instead of those described, the model agrees with the recordings, and no effect is needed.
+    Dimensions(Vec<Dimension>),
     /// An effect that was selected and not kept.
     Refused {
         /// Its name.

@@ -48,6 +48,7 @@ pub fn table_faults(
         friction(table, uncertainty),
         error(quality),
         shortening(table),
+        push(table),
         inverse(table),
     ];
     faults.into_iter().flatten().collect()
@@ -139,6 +140,38 @@ fn shortening(table: &MuscleTable) -> Option<String> {
     })
 }
 
+/// A muscle that pushes at its longest tested length although its pressure is above the deadband.
+fn push(table: &MuscleTable) -> Option<String> {
+    let muscle = Muscle::<f64>::build(table).ok()?;
+    let (t, l0) = (&table.tested, f64::from(table.geometry.rest_length.metres()));
+    let held = muscle.at_stroke(Length::from_metres(f64::from(t.contraction_low) * l0));
+    let (low, high) = (f64::from(t.pressure_low.pascals()), f64::from(t.pressure_high.pascals()));
+    let onset = f64::from(table.deadband.pascals()) + contact(table);
+    let pressures = (0..=STEPS).map(|i| low + (high - low) * i as f64 / STEPS as f64).filter(|p| *p > onset);
+    let force = |p: f64| muscle.parts(&held, Pressure::from_pascals(p)).quasi();
+    let (pressure, least) = pressures.map(|p| (p, force(p))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (least < -CREEP * force(high).abs()).then(|| {
+        format!(
+            "the force is {least:.0} N at {:.0} kPa and the longest tested length: a muscle under pressure pulls there; check the dimensions of \
+             the muscle and the units (--fit-geometry)",
+            pressure / 1e3
+        )
+    })
+}
+
+/// A mean error of more than [`WORST_MEAN_ERROR`] of the largest measured force, N: a table may be small beside its own blocked force, and
+/// far from what was measured. For a fit, which knows the measured force.
+pub(crate) fn far_from_measured(quality: &FitQuality, blocked: f64, largest: f64) -> Option<String> {
+    let error = 0.01 * quality.mean_error_percent * blocked.abs();
+    let percent = 100.0 * error / largest;
+    (largest > 0.0 && blocked > largest && percent > WORST_MEAN_ERROR).then(|| {
+        format!(
+            "the table does not describe its recordings: the mean error is {error:.1} N, {percent:.0} % of the largest measured force (bound: \
+             {WORST_MEAN_ERROR:.0} %); check units, signs and the dimensions of the muscle"
+        )
+    })
+}
+
 /// Places in the tested range where the force falls with rising pressure, so that the inverse may not find a pressure.
 fn inverse(table: &MuscleTable) -> Option<String> {
     let muscle = Muscle::<f64>::build(table).ok()?;
@@ -203,6 +236,23 @@ mod tests {
         assert!(faults(&table, None).is_empty());
         table.effects[0] = creep(5e3);
         assert!(!faults(&table, None).is_empty());
+    }
+
+    #[test]
+    fn a_muscle_that_pushes_under_pressure_is_a_fault() {
+        let mut table = model_core::table::example();
+        assert!(push(&table).is_none());
+        table.geometry.braid_angle = model_core::units::Angle::from_degrees(40.0);
+        assert!(push(&table).is_some_and(|f| f.contains("pulls there")), "{:?}", push(&table));
+    }
+
+    #[test]
+    fn an_error_is_compared_with_the_measured_force_too() {
+        let quality = FitQuality { samples: 10, mean_error_percent: 4.0, ..FitQuality::default() };
+        assert!(
+            far_from_measured(&quality, 1000.0, 100.0).is_some_and(|f| f.contains("40 % of the largest"))
+        );
+        assert!(far_from_measured(&quality, 130.0, 100.0).is_none());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::{Campaign, Hashes, Import, Reader};
+use pam_diagnose::diagnose_described;
 use pam_diagnose::reference::{Against, ChangeReport, Options as Compared, compare};
 use pam_fit::table_file::{self, TableFile};
 use pam_fit::{Fit, fit};
@@ -81,11 +82,15 @@ fn diagnose(result: &mut Analysis, item: &WorkItem, inputs: &Inputs, loaded: &Lo
     let Some(muscle) = &loaded.muscle else { return };
     let geometry = muscle.geometry();
     let asked = pam_diagnose::Options { muscle: item.muscle.clone(), ..Default::default() };
-    match pam_diagnose::history::diagnose(&loaded.campaign, &geometry, &asked) {
-        Ok(mut answer) => {
-            if let Some(fitted) = &result.fit {
-                answer.adopt_blocked_force(fitted.summary.blocked_force_N);
-            }
+    let answer = match &result.fit {
+        Some(fitted) => diagnose_described(&loaded.campaign, muscle, &asked, Ok(fitted)),
+        None => {
+            let own = fit(&loaded.campaign, muscle, &options.fit);
+            diagnose_described(&loaded.campaign, muscle, &asked, own.as_ref())
+        }
+    };
+    match answer {
+        Ok(answer) => {
             if options.reports {
                 let page = diagnose_page::page(&answer, &geometry, &loaded.campaign);
                 result.files.push(("diagnosis.html".into(), page.html().into_bytes()));

@@ -54,12 +54,11 @@ pub(crate) fn diagnose(
     muscle: PyRef<'_, Muscle>,
 ) -> PyResult<DiagnosisResult> {
     let (campaign, muscle) = (campaign.0.clone(), muscle.0.clone());
-    let geometry = muscle.geometry();
     let options = diagnosis::Options { muscle: muscle.name.clone(), ..Default::default() };
-    let mut answer =
-        py.detach(|| diagnosis::history::diagnose(&campaign, &geometry, &options)).map_err(raised)?;
-    if let Ok(plain) = py.detach(|| pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default())) {
-        answer.adopt_blocked_force(plain.summary.blocked_force_N);
-    }
+    let described = || {
+        let plain = pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default());
+        diagnosis::diagnose_described(&campaign, &muscle, &options, plain.as_ref())
+    };
+    let answer = py.detach(described).map_err(raised)?;
     Ok(DiagnosisResult { answer, campaign, muscle })
 }

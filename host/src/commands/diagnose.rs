@@ -22,11 +22,13 @@ use pam_data::output::{Turn, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
-use pam_diagnose::{Diagnosis, Options, next_experiment::next_experiment, refitted_table};
+use pam_diagnose::{
+    Diagnosis, Options, diagnose_described, next_experiment::next_experiment, refitted_table,
+};
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
 use pam_fit::table_faults::table_faults;
-use pam_fit::{Fit, RecordingResidual, recording_table};
+use pam_fit::{RecordingResidual, recording_table};
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};
@@ -124,9 +126,13 @@ impl Arguments {
         let progress = SharedProgress::new(Arc::new(ProgressLine::new(&watched, "diagnosing")));
         let checks = Checks::read(&self.check)?;
         let options = Options { muscle: muscle.name.clone(), checks, given, progress };
-        let mut answer = pam_diagnose::history::diagnose(&campaign, &muscle.geometry(), &options)?;
+        let plain = pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default());
+        let mut answer = diagnose_described(&campaign, &muscle, &options, plain.as_ref())?;
+        let plain = plain.ok().filter(|_| answer.judged());
         let diagnosed = start.elapsed();
-        let plain = measure_errors(&mut answer, &campaign, &muscle, table.as_ref())?;
+        if let Some(rms) = table.map(|table| predict(&table, &campaign)).transpose()?.and_then(|p| p.rms) {
+            answer.misfit_rms_N = rms;
+        }
         let refitted = self.refit(&campaign, &muscle, &answer, &options);
         // The progress line is removed before other output.
         drop(options);
@@ -148,7 +154,7 @@ impl Arguments {
         }
         if let (Some(path), None) = (&self.next, &answer.next_experiment) {
             console.warning(format!(
-                "{} is not written: no named effect needs another recording to separate it from others",
+                "{} is not written: no protocol of the program separates the named effects further; \"What to do\" says what else helps",
                 path.display()
             ));
         }
@@ -228,24 +234,6 @@ impl Arguments {
         }
         Ok(())
     }
-}
-
-/// The errors of the table without effects, and of the given table, on the recordings.
-fn measure_errors(
-    answer: &mut Diagnosis,
-    campaign: &Campaign,
-    muscle: &MuscleDescription,
-    table: Option<&TableFile>,
-) -> Result<Option<Fit>> {
-    let plain = answer.judged().then(|| pam_fit::fit(campaign, muscle, &pam_fit::Options::default()).ok());
-    let plain = plain.flatten();
-    if let Some(plain) = &plain {
-        answer.adopt_blocked_force(plain.summary.blocked_force_N);
-    }
-    if let Some(rms) = table.map(|table| predict(table, campaign)).transpose()?.and_then(|p| p.rms) {
-        answer.misfit_rms_N = rms;
-    }
-    Ok(plain)
 }
 
 /// The answer as text, with the residuals of the table without effects by recording.

@@ -291,17 +291,13 @@ impl Analysis {
     /// What the model leaves out of all recordings.
     ///
     /// # Errors
-    /// As [`pam_diagnose::history::diagnose`].
+    /// As [`pam_diagnose::diagnose_described`].
     pub fn diagnose(&self, muscle: &str) -> Result<Diagnosed> {
         let (muscle, campaign, ..) = self.read(muscle)?;
         let geometry = muscle.geometry();
         let options = pam_diagnose::Options { muscle: muscle.name.clone(), ..Default::default() };
-        let mut answer = pam_diagnose::history::diagnose(&campaign, &geometry, &options)?;
-        if answer.judged()
-            && let Ok(plain) = pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default())
-        {
-            answer.adopt_blocked_force(plain.summary.blocked_force_N);
-        }
+        let plain = pam_fit::fit(&campaign, &muscle, &pam_fit::Options::default());
+        let answer = pam_diagnose::diagnose_described(&campaign, &muscle, &options, plain.as_ref())?;
         let html = in_page(diagnose_page::page(&answer, &geometry, &campaign).html());
         let report = Self::keep_report(&mut self.state(), report_name()?, html);
         Ok(Diagnosed { text: pam_report::wording::summary(&answer), report })

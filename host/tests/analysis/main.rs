@@ -19,3 +19,4 @@ mod real_recordings;
 mod reference;
 mod stock;
 mod updated_table;
+mod wrong_description;

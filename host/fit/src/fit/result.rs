@@ -5,7 +5,7 @@ use model_core::table::{Kind as TableKind, MuscleTable, Tested};
 use model_core::units::{Force, Length, Pressure};
 
 use crate::error::FitCode;
-use crate::table_faults::table_faults;
+use crate::table_faults::{far_from_measured, table_faults};
 use crate::table_file::{About, TableFile, Uncertainty, stored_mountings};
 use pam_data::error::{Error, Result};
 use pam_data::muscle_description::{Kind, MuscleDescription};
@@ -86,8 +86,10 @@ impl Fit {
             }),
         );
         let mut fit = Self { table, solution, uncertain, table_root, chunks, midline, models, summary };
-        fit.summary.faults =
-            table_faults(&fit.table, Some(&fit.stored_uncertainty()), &fit.summary.quality());
+        let quality = fit.summary.quality();
+        fit.summary.faults = table_faults(&fit.table, Some(&fit.stored_uncertainty()), &quality);
+        let far = far_from_measured(&quality, fit.summary.blocked_force_N, fit.summary.largest_force_N);
+        fit.summary.faults.extend(far);
         Ok(fit)
     }
 }
@@ -122,6 +124,19 @@ impl Fit {
 
 /// The largest force of a muscle as a share of what its braid alone would make of the pressure; deadband and elasticity reduce it.
 pub(super) const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
+
+impl Solution {
+    /// What is wrong where the force is not what such a braid makes of the pressure: units or dimensions. `None` where it is usual.
+    #[must_use]
+    pub fn unusual_share_of_braid(&self) -> Option<String> {
+        let (least, most) = SHARE_OF_BRAID;
+        let share = self.problem.share_of_braid().filter(|s| !(least..most).contains(s))?;
+        Some(format!(
+            "the force is {share:.2} times what the described braid makes of the recorded pressure; {least} to {most} is usual: check the \
+             units of force and pressure, and the muscle's dimensions"
+        ))
+    }
+}
 
 /// The table's numbers from the solution, checked.
 ///

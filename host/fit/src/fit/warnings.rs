@@ -1,6 +1,5 @@
 //! Warnings about a fit: what was seen, what it means, what to do.
 
-use super::result::SHARE_OF_BRAID;
 use super::screen::PointUse;
 use super::solution::Solution;
 use super::weights::scatter;
@@ -56,13 +55,7 @@ fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
             force.high.max(0.0)
         ));
     }
-    let (least, most) = SHARE_OF_BRAID;
-    if let Some(share) = solution.problem.share_of_braid().filter(|s| !(least..most).contains(s)) {
-        out.push(format!(
-            "the force is {share:.2} times what the described braid makes of the recorded pressure; {least} to {most} is usual: check the \
-             units of force and pressure, and the muscle's dimensions"
-        ));
-    }
+    out.extend(solution.unusual_share_of_braid());
     if mean_error > NO_MUSCLE {
         out.push(format!(
             "the table does not describe these recordings: its mean error is {mean_error:.0} % of the blocked force; check the units of \
@@ -178,7 +171,7 @@ fn friction(solution: &Solution, out: &mut Vec<String>) {
                  whether force and pressure are synchronous"
             };
             out.push(format!(
-                "k_F is {k:.3} at {:.0} kPa: negative friction is impossible; {check}",
+                "k_F is {k:.3} at {:.0} kPa, below zero, which no friction is; {check}",
                 p / 1e3
             ));
         }
@@ -257,8 +250,13 @@ fn dimensions(solution: &Solution, out: &mut Vec<String>) {
             a.name, a.value, a.unit
         ));
     }
-    let undetermined: Vec<&str> =
-        solution.problem.adjusted.iter().filter(|a| a.determined < 0.5).map(|a| a.name.as_str()).collect();
+    let undetermined: Vec<&str> = solution
+        .problem
+        .adjusted
+        .iter()
+        .filter(|a| a.determined < 0.5 && !a.at_bound)
+        .map(|a| a.name.as_str())
+        .collect();
     if !undetermined.is_empty() {
         out.push(format!(
             "the recordings poorly determine {}: the value is mostly that of the muscle description",
@@ -292,7 +290,7 @@ fn between_pressures(left_out: &[Option<f64>], out: &mut Vec<String>) {
         && worst > 5.0
     {
         out.push(format!(
-            "a pressure predicted from the others has an error of {worst:.1} % of blocked force: test more pressures"
+            "the worst left-out pressure has a mean error of {worst:.1} % of the blocked force: test more pressures"
         ));
     }
 }

@@ -1,7 +1,7 @@
 //! Remarks on what can and cannot be concluded.
 
 use pam_data::pluralise::pluralise;
-use pam_diagnose::remark::{Refusal, Remark, RestFriction, Scatter, Unjudgeable};
+use pam_diagnose::remark::{Dimension, Refusal, Remark, RestFriction, Scatter, Unjudgeable};
 use pam_diagnose::reserve::Reserve;
 
 /// A remark as text without its full stop.
@@ -82,6 +82,7 @@ pub fn remark(remark: &Remark) -> String {
             "{effect} is larger than any published value. Check the muscle's description (diameter, braid angle, rest length, wall) and \
              the units first: an error there has the same effect"
         ),
+        Remark::Dimensions(all) => dimensions(all),
         Remark::Refused { effect, why } => refused(effect, why),
         Remark::Measured { check, value } => format!("measured with {check}: {value}"),
         Remark::Table { file, reserve: r } => format!("{file}: {}", reserve(r)),
@@ -112,7 +113,18 @@ fn unjudgeable(reason: &Unjudgeable) -> String {
             "the model's error ({misfit:.3} N rms) is larger than the measured force ({measured:.3} N rms). Check the muscle's \
              description and the units"
         ),
+        Unjudgeable::Implausible(why) => why.clone(),
     }
+}
+
+fn dimensions(all: &[Dimension]) -> String {
+    let value =
+        |d: &Dimension| format!("{} {:.2} {} instead of {:.2}", d.name, d.fitted, d.unit, d.described);
+    format!(
+        "wrong dimensions in the muscle's description leave the same error: with {} the model agrees with these recordings, and no effect is \
+         needed. Measure them before you rely on a name",
+        super::list(&all.iter().map(value).collect::<Vec<_>>())
+    )
 }
 
 fn friction_at_rest(law: RestFriction) -> String {
@@ -135,13 +147,13 @@ fn concealed(rms: f64, share: f64, candidates: &[String]) -> String {
         "No effect of the library leaves such a difference".to_owned()
     } else {
         format!(
-            "Each of these effects leaves such a difference: {}; none is distinct enough to be named",
+            "Effects that leave such a difference: {}. None is distinct enough to be named",
             candidates.join(", ")
         )
     };
     format!(
-        "one bladder does not fit all pressures: the tables take up {rms:.2} N rms ({:.2} % of blocked force) that changes with \
-         pressure. {which}. The table is accurate at tested pressures, less so between and beyond them",
+        "one bladder does not fit all pressures: coefficients fitted at each pressure absorb {rms:.2} N rms ({:.2} % of blocked force) that \
+         one set of coefficients does not. {which}. The table is accurate at tested pressures, less so between and beyond them",
         100.0 * share
     )
 }
@@ -154,6 +166,15 @@ pub(super) fn scatter(s: &Scatter) -> String {
         100.0 * s.share,
         s.memory
     )
+}
+
+/// The first names of a list, and how many follow.
+fn first_of(names: &[String]) -> String {
+    const LISTED: usize = 5;
+    match names.len().checked_sub(LISTED + 1) {
+        None => names.join(", "),
+        Some(more) => format!("{}, and {} more", names[..LISTED].join(", "), more + 1),
+    }
 }
 
 fn refused(effect: &str, why: &Refusal) -> String {
@@ -184,7 +205,7 @@ fn refused(effect: &str, why: &Refusal) -> String {
         Refusal::Competitors { share, others } => format!(
             "{effect} not named: it would explain {:.0} % of the excess error, but these explain it nearly as well: {}",
             100.0 * share,
-            others.join(", ")
+            first_of(others)
         ),
         Refusal::SlowDrift => format!(
             "{effect} not named: it would explain much of the excess error, but so would a slowly drifting sensor"
