@@ -108,7 +108,7 @@ enum Command {
     Run(commands::run::Arguments),
     /// Record what a controller measures, as CSV or MCAP.
     Record(commands::record::Arguments),
-    /// Make a whole recording of one that was cut off.
+    /// Repair an interrupted recording.
     Recover(commands::record::RecoverArguments),
     /// Vent the muscle and disarm the controller.
     Vent(commands::vent::Arguments),
@@ -118,7 +118,7 @@ enum Command {
     Studio(commands::studio::Arguments),
     /// A controller without hardware, for all commands that talk to one.
     Emulate(commands::emulate::Arguments),
-    /// Ask a controller what it is, what it does and what went wrong; change its settings.
+    /// Show the identity, state, and faults of a controller; change its settings.
     Device(commands::device::Arguments),
     /// Show which settings files count here, and what they say.
     Settings(commands::settings::Arguments),

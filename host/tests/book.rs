@@ -1,8 +1,8 @@
 //! The book's commands are run, their output is compared, its tables are made from the source.
 //!
 //! In a ```` ```console ```` block a line that begins with `$ ` is run by `sh` in a folder of the page's own; the lines after it are
-//! what it prints. `…` alone on a line represents any lines. Numbers may differ somewhat, for they belong to a seed and
-//! a version; words may not. ```` ```toml file=NAME ```` writes a file first. Between `<!-- begin NAME -->` and `<!-- end -->` stands a
+//! what it prints. `…` alone on a line represents any lines. Numbers may differ by 2 %, for they belong to a seed and a compiler, and times
+//! by 40 %; words may not. ```` ```toml file=NAME ```` writes a file first. Between `<!-- begin NAME -->` and `<!-- end -->` stands a
 //! table that the source makes. A line `<!-- picture FILE -->` before an image says which file of that folder the image is.
 //!
 //! Did this fail after a change that was meant? Run `BOOK=overwrite cargo test -p host --test book`, and read the difference. With
@@ -75,6 +75,18 @@ fn run(command: &str, folder: &Path, bin: &Path) -> (String, bool) {
     (text.trim_end().to_owned(), output.status.success())
 }
 
+/// How far a number may be from the book's: a share of it, and a unit of its last decimal.
+/// Times belong to the machine.
+fn near(expected: &str, actual: &str, unit: Option<&String>) -> bool {
+    let (Ok(p), Ok(q)) = (expected.parse::<f64>(), actual.parse::<f64>()) else { return expected == actual };
+    let time = unit
+        .is_some_and(|u| ["s", "ms", "us", "µs", "min"].contains(&u.trim_end_matches([',', ';', ':', ')'])));
+    let share = if time { 0.4 } else { 0.02 };
+    let decimals = expected.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    // The word NaN is a number to `parse`, and no NaN is near another.
+    expected == actual || (p - q).abs() <= share * p.abs().max(q.abs()) + 1.01 * 0.1_f64.powi(decimals as i32)
+}
+
 /// Words and numbers of a line; the amount of blanks between them does not matter.
 fn alike(expected: &str, actual: &str) -> bool {
     let tokens = |line: &str| -> Vec<String> {
@@ -95,12 +107,7 @@ fn alike(expected: &str, actual: &str) -> bool {
         out
     };
     let (a, b) = (tokens(expected), tokens(actual));
-    a.len() == b.len()
-        && a.iter().zip(&b).all(|(x, y)| match (x.parse::<f64>(), y.parse::<f64>()) {
-            // The word NaN is a number to `parse`, and no NaN is near another.
-            (Ok(p), Ok(q)) => x == y || (p - q).abs() <= 0.4 * p.abs().max(q.abs()) + 0.05,
-            _ => x == y,
-        })
+    a.len() == b.len() && a.iter().zip(&b).enumerate().all(|(i, (x, y))| near(x, y, a.get(i + 1)))
 }
 
 fn same(expected: &[String], actual: &[String]) -> bool {

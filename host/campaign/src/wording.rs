@@ -30,7 +30,7 @@ pub fn plan_is_full(steps: usize) -> String {
 #[must_use]
 pub fn why_with_gain(why: &str, gain: &Gain) -> String {
     format!(
-        "{} (expected information: {:.2} nats about the table, {:.2} about which effect it is, {:.2} about effects that nothing has shown).",
+        "{} (expected information in nats: table {:.2}, choice between effects {:.2}, undetected effects {:.2}).",
         why.trim_end_matches('.'),
         gain.table,
         gain.set,
@@ -48,7 +48,7 @@ pub fn why(gain: &Gain, diagnosis: Option<&Diagnosis>, step: &Step) -> String {
         let open = diagnosis.and_then(|d| d.missing.iter().find(|m| !m.confusable_with.is_empty()));
         if let Some(open) = open {
             return format!(
-                "It separates {} from {} best for its time.",
+                "It gives the most information per second to separate {} from {}.",
                 open.effect,
                 open.confusable_with.join(", ")
             );

@@ -60,15 +60,12 @@ pub fn remark(rests: &[Rest]) -> Option<String> {
     let assumed = |after: Preceding, what: &str| {
         let mut of = rests.iter().filter(|r| !r.known && r.after == after);
         let seconds = of.next()?.seconds;
-        Some(format!(
-            "{} {what}: counted as {seconds} s without pressure",
-            pluralise(1 + of.count(), "pause")
-        ))
+        Some(format!("{} {what} ({seconds} s without pressure assumed)", pluralise(1 + of.count(), "pause")))
     };
     let all = [
         assumed(Preceding::SameMounting, "between recordings of one mounting"),
         assumed(Preceding::OtherMounting, "between mountings"),
     ];
     let all: Vec<String> = all.into_iter().flatten().collect();
-    (!all.is_empty()).then(|| format!("the clock does not show {}", all.join(", nor ")))
+    (!all.is_empty()).then(|| format!("the recordings do not contain {}", all.join(" and ")))
 }

@@ -180,7 +180,7 @@ fn recommendation(d: &Diagnosis) -> Section {
     }
     if !muscle.is_empty() {
         steps.push(format!(
-            "Write a table with {} by `host diagnose … -o T2.pam`, and check it on new recordings.",
+            "Take the table with {} that `host diagnose … -o T2.pam` writes, and check it on new recordings with `host predict`.",
             names(&muscle)
         ));
     }

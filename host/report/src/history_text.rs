@@ -63,7 +63,7 @@ pub fn text(history: &History) -> String {
     if history.named {
         let _ = writeln!(
             s,
-            "  memory of the bladder: the carried part of the pressure relaxes by {} % in all ({} % a decade); it is zero at {} kPa{}",
+            "  memory of the bladder: the carried part of the pressure relaxes by {} % in all ({} % per decade); the bladder carries nothing at {} kPa{}",
             with_half(&history.law.relaxed_share, 100.0, 0),
             with_half(
                 &history.law.relaxed_share,
@@ -87,14 +87,18 @@ pub fn text(history: &History) -> String {
             .iter()
             .map(|l| {
                 format!(
-                    "{} {:.0} % (entered last {:.0} %)",
+                    "{} {:.0} % ({:.0} %)",
                     wording::layer(l.layer),
                     100.0 * l.in_order,
                     100.0 * l.last_in
                 )
             })
             .collect();
-        let _ = writeln!(s, "  of the squared error of unseen runs: {}", shares.join(", "));
+        let _ = writeln!(
+            s,
+            "  shares of the squared error of unseen runs, in the order of entry (and when entered last): {}",
+            shares.join(", ")
+        );
     }
     s
 }

@@ -129,10 +129,10 @@ pub fn svg(text: &str) -> String {
             Kind::Emphasis => out.push_str(&format!("<tspan font-style=\"italic\">{inner}</tspan>")),
             // A shift lasts until the end of the text, so an empty-looking part takes it back.
             Kind::Sub => out.push_str(&format!(
-                "<tspan dy=\"3\" font-size=\"78%\">{inner}</tspan><tspan dy=\"-3\">\u{200b}</tspan>"
+                "<tspan dy=\"3\" font-size=\"0.78em\">{inner}</tspan><tspan dy=\"-3\">\u{200b}</tspan>"
             )),
             Kind::Super => out.push_str(&format!(
-                "<tspan dy=\"-4\" font-size=\"78%\">{inner}</tspan><tspan dy=\"4\">\u{200b}</tspan>"
+                "<tspan dy=\"-4\" font-size=\"0.78em\">{inner}</tspan><tspan dy=\"4\">\u{200b}</tspan>"
             )),
         }
     }
@@ -220,7 +220,7 @@ mod tests {
         );
         assert_eq!(plain(text), "Force F_AVG in a<b at 10^3 kPa, x_1 and 2*3");
         assert_eq!(markdown(text), "*Force* F<sub>AVG</sub> in `a<b` at 10<sup>3</sup> kPa, x\\_1 and 2\\*3");
-        assert!(svg(text).contains("<tspan dy=\"3\" font-size=\"78%\">AVG</tspan>"));
+        assert!(svg(text).contains("<tspan dy=\"3\" font-size=\"0.78em\">AVG</tspan>"));
     }
 
     #[test]

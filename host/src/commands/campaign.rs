@@ -63,7 +63,7 @@ pub struct Arguments {
     /// Where the emulated firmware runs: in this process, or in QEMU.
     #[arg(long, value_name = "WHERE", value_parser = ["native", "qemu"], requires = "emulate")]
     on: Option<String>,
-    /// Device seconds in a second at most, for the emulated controller: up to 100.
+    /// Largest ratio of emulated to real time, for the emulated controller: up to 100.
     #[arg(
         long,
         value_name = "N",

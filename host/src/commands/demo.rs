@@ -113,7 +113,7 @@ impl Arguments {
         step(
             6,
             format!(
-                "read back: on {} rows of telemetry inside its tested range the table is wrong by {:.2} N rms ({:.2} % of blocked force)",
+                "read back: on {} rows of telemetry inside its tested range the error of the table is {:.2} N rms ({:.2} % of blocked force)",
                 telemetry.1,
                 telemetry.0,
                 100.0 * telemetry.0 / blocked
@@ -177,7 +177,7 @@ impl Arguments {
         )?;
         found.keep(&mut client)?;
         console.note(format!(
-            "              found the regulator: gain {:.3}, lag {:.0} ms, line {:.1} ms, {} {:.1} MPa/s; lag and line are inverted from here on",
+            "              found the regulator: gain {:.3}, time constant {:.0} ms, line {:.1} ms, {} {:.1} MPa/s; the controller compensates both from here on",
             found.gain,
             found.lag_s * 1e3,
             found.line_s * 1e3,
@@ -210,7 +210,7 @@ impl Arguments {
         step(
             5,
             format!(
-                "tracked a sine and steps under {} laws, {} samples, {} lost",
+                "tracked a sine and steps with {} controllers, {} samples, {} lost",
                 Law::ALL.len(),
                 tracks.iter().map(|t: &Track| t.samples.len()).sum::<usize>(),
                 losses.samples

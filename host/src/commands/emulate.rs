@@ -36,7 +36,7 @@ pub struct Arguments {
     /// where: write it as axis_address into rig.toml.
     #[arg(long)]
     axis: bool,
-    /// Device seconds in a second at most.
+    /// Largest ratio of emulated to real time.
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_negative_numbers = true)]
     speed: f64,
     /// How long, s [default: until Ctrl-C].

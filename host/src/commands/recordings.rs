@@ -26,7 +26,7 @@ pub struct Recordings {
     /// times.
     #[arg(long = "where", value_name = "COLUMN=VALUE")]
     pub filters: Vec<String>,
-    /// What becomes of rows with empty cells, NaN or `---` in a column that is used [default: error, or as the import description says].
+    /// Treatment of rows with empty cells, NaN or `---` in a column that is used [default: error, or as the import description says].
     #[arg(long, value_enum, value_name = "WHAT")]
     pub missing: Option<MissingRows>,
     /// The sheet of an Excel or OpenDocument workbook [default: the only one with contents].

@@ -59,7 +59,7 @@ pub struct Arguments {
     /// Samples per second, at most the controller's own rate [default: its own rate].
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// Where the pressure for a force comes from; stays in force afterwards.
+    /// Where the pressure for a force comes from; remains set afterwards.
     #[arg(long, value_enum, value_name = "SOURCE")]
     feed_forward: Option<Source>,
     /// Print how it went as JSON.

@@ -309,7 +309,7 @@ fn missing(what: &str, headers: impl Iterator<Item = String>, names: &[String]) 
         help = format!("did you mean `{near}` by `{name}`? {help}");
     } else if !headers.is_empty() {
         help = format!(
-            "{help}; needed is one of {}, or an import description (--import) that says which column it is",
+            "{help}; one of these columns is required: {}, or an import description (--import) that says which column it is",
             headers.join(", ")
         );
     }

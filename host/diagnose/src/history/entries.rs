@@ -67,8 +67,8 @@ pub(super) fn memory(history: &History, peak: f64) -> Missing {
         share_explained: history.unseen.gain.clamp(0.0, 1.0),
         parameters,
         confusable_with: vec![NAMES[1].into()],
-        summary: "The bladder carries a part of the pressure. That part relaxes at constant length, as much in each tenfold of time, and \
-                  comes back as slowly when the muscle is vented: the next runs remember it."
+        summary: "The bladder carries a part of the pressure. That part relaxes at constant length in proportion to the logarithm of time, \
+                  and recovers as slowly after venting: each run starts from the state that the runs before it left."
             .into(),
         source: "P_eff = P + c·z̄, dz_k/dt = (u − z_k)/τ_k, u = p_el·clip((P − 60 kPa)/max(|p_el|, 60 kPa), 0, 1), p_el = P_th(L) − P_b; \
                  linear relaxation with a flat spectrum over decades: W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear \

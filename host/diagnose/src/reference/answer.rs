@@ -13,7 +13,7 @@ use super::shapes::{Change, Class, Owner};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Nothing changed beyond what this actuator does anyway.
+    /// No change beyond the normal repeatability of this actuator.
     Consistent,
     /// What changed is named, and nothing else stands out.
     Explained,

@@ -99,17 +99,21 @@ pub(super) fn compare(before: &Campaign, after: &Campaign, reference_error: f64)
             let mut of: Vec<usize> = bands.keys().map(|k| k.0).collect();
             of.dedup();
             let names: Vec<String> = of.iter().map(|i| format!("{:.0}", levels[*i] / 1e3)).collect();
-            if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+            if names.is_empty() { "no pressure".to_owned() } else { names.join(", ") + " kPa" }
         };
         return Err(Error::new(
             DataCode::RecordingOutOfRange,
             format!(
-                "strokes of AFTER and of the reference have too little in common: levels of {} kPa and of {} kPa, two strokes each way needed",
+                "the compared recordings have too few strokes at the same pressure: {} in the later ones, {} in the reference; three bands of \
+                 pressure and stroke are required, with two strokes each way",
                 list(&new),
                 list(&old)
             ),
         )
-        .help("record the same pressures over the same stroke, three cycles or more"));
+        .help(
+            "record the same pressures over the same stroke, three cycles or more; files of one campaign belong into one folder, or share a \
+             date in their names",
+        ));
     }
     let pick = |bands: &BTreeMap<Key, Band>| keys.iter().map(|k| bands[k]).collect::<Vec<Band>>();
     let (before, after) = (pick(&old), pick(&new));

@@ -196,12 +196,12 @@ impl std::fmt::Display for Summary {
         };
         writeln!(
             f,
-            "{}: {} rows, P0 {:.places$}{interval} kPa, blocked force {:.1} N, rms {:.3} N{meaning}",
-            self.muscle, self.samples, self.deadband_kPa, self.blocked_force_N, self.rms_N
+            "{}: {} of {} rows fitted, P0 {:.places$}{interval} kPa, blocked force {:.1} N, rms {:.3} N{meaning}",
+            self.muscle, self.rows.fitted, self.samples, self.deadband_kPa, self.blocked_force_N, self.rms_N
         )?;
         write!(
             f,
-            "largest measured force {:.1} N; rms is {:.2} % of it\nerror of blocked force: {:.3} % mean, {:.3} % at most",
+            "largest measured force {:.1} N; rms is {:.2} % of it\nerror of the mid-lines, of blocked force: {:.3} % mean, {:.3} % at most",
             self.largest_force_N,
             100.0 * self.rms_N / self.largest_force_N,
             self.mean_error_pct,
@@ -242,7 +242,7 @@ impl std::fmt::Display for Summary {
         for a in &self.adjusted {
             write!(
                 f,
-                "\n{}: {:.3} ± {:.3} {} (described {:.3}; {:.0} % determined by the recordings{})",
+                "\n{}: {:.3} ± {:.3} {} (description {:.3}; {:.0} % determined by the recordings{})",
                 a.name,
                 a.value,
                 NORMAL_95 * a.std,

@@ -78,6 +78,13 @@ pub(super) fn section(d: &Diagnosis, residuals: &[RecordingResidual]) -> Section
             d.r#where.iter().take(5).map(|r| format!("{} (p = {})", wording::region(r), significant(r.p, 2))),
         );
     }
+    let remembers = d.missing.iter().any(is_from_history);
+    if remembers {
+        section.text(
+            "Shares of runs and mountings refer to the recordings as they are. All other shares and all pictures below refer to the recordings \
+             after the memory of the bladder is removed.",
+        );
+    }
     // The coordinates where the misfit is concentrated come first, then the others that were examined.
     let rank =
         |p: &Profile| d.r#where.iter().position(|r| r.coordinate == p.coordinate).unwrap_or(usize::MAX);
@@ -107,7 +114,8 @@ pub(super) fn section(d: &Diagnosis, residuals: &[RecordingResidual]) -> Section
             // Beneath, for it may be larger than what it explains.
             panel = panel.hair("force of the named effects", Colour::Muted, &time, &effects);
         }
-        panel = panel.hair("plain model", Colour::Series(1), &time, &before);
+        let plain = if remembers { "without the memory" } else { "plain model" };
+        panel = panel.hair(plain, Colour::Series(1), &time, &before);
         if found {
             panel = panel.hair("with the named effects", Colour::Series(2), &time, &after);
         }
@@ -117,7 +125,10 @@ pub(super) fn section(d: &Diagnosis, residuals: &[RecordingResidual]) -> Section
         section.figure(Figure::new(
             "misfit-time",
             "Residual over time: measured minus computed force",
-            if d.missing.is_empty() {
+            if remembers {
+                "Residual after the memory of the bladder is removed, without and with the effects named beside it. A band of even width around \
+                 zero is noise."
+            } else if d.missing.is_empty() {
                 "Residual of the plain model. A band of even width around zero is noise."
             } else {
                 "Residual of the plain model, and with the named effects: of a complete model, only noise remains. The grey line is the force of the \

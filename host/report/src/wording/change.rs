@@ -167,7 +167,7 @@ pub fn place(p: &Place) -> String {
         ("recording", n) => format!("recording {n:.0} of AFTER"),
         (name, _) => format!("{name} {}", range.trim_end()),
     };
-    format!("{:.0} % of the difference lies in {what} ({:.0} % of the data)", 100.0 * p.share, 100.0 * p.rows)
+    format!("{:.0} % of the difference lies at {what} ({:.0} % of the data)", 100.0 * p.share, 100.0 * p.rows)
 }
 
 /// A share that is not zero.
@@ -306,22 +306,22 @@ pub fn in_usual_unit(value: f64, unit: &str) -> String {
 fn one(text: &mut String, m: &Changed) {
     let _ = writeln!(
         text,
-        "\n{} (probability {:.2}; its class {:.2})",
+        "\n{} (probability {:.2}; its class of effects {:.2})",
         m.effect, m.probability, m.class_probability
     );
     for s in &m.parameters {
-        let _ = writeln!(text, "  how large   {} {} (95 %)", s.name, size(s));
+        let _ = writeln!(text, "  size         {} {} (95 %)", s.name, size(s));
     }
-    let _ = writeln!(text, "  law         {}", m.change.about().changed.law);
-    let _ = writeln!(text, "  since when  {}", since(&m.since));
-    let _ = writeln!(text, "  whose       {}", owner(m.owner));
-    let _ = writeln!(text, "  what to do  {}", remedy(m.change));
+    let _ = writeln!(text, "  law          {}", m.change.about().changed.law);
+    let _ = writeln!(text, "  since        {}", since(&m.since));
+    let _ = writeln!(text, "  belongs to   {}", owner(m.owner));
+    let _ = writeln!(text, "  what to do   {}", remedy(m.change));
     if !m.confusable_with.is_empty() {
-        let _ = writeln!(text, "  or          {}", m.confusable_with.join(", "));
+        let _ = writeln!(text, "  alternatives {}", m.confusable_with.join(", "));
     }
     let apart = separate::named(m);
     if !apart.is_empty() {
-        let _ = writeln!(text, "  separate by {}", apart.join("; "));
+        let _ = writeln!(text, "  distinguish by {}", apart.join("; "));
     }
 }
 

@@ -29,7 +29,7 @@ fn consistent(none: f64) -> String {
     if none < DOUBTFUL {
         format!("No change stands out, but the probability that nothing changed is only {none:.2}.")
     } else {
-        "Nothing changed beyond what this actuator does anyway.".into()
+        "No change beyond the normal repeatability of this actuator.".into()
     }
 }
 
@@ -40,6 +40,6 @@ mod tests {
     #[test]
     fn nothing_changed_is_stated_with_its_doubt() {
         assert!(consistent(0.58).contains("is only 0.58"));
-        assert!(consistent(0.97).starts_with("Nothing changed"));
+        assert!(consistent(0.97).starts_with("No change beyond"));
     }
 }

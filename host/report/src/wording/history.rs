@@ -69,7 +69,7 @@ fn includes_zero(of: &Finding) -> String {
 fn first_run(of: &Finding, left: Option<f64>) -> String {
     let rest = match (of.found, left) {
         (true, Some(left)) => format!(
-            "; the memory of the bladder, which does not recover in the pauses, explains it except for {:.1} N",
+            "; the memory of the bladder, which does not recover in the pauses, explains all but {:.1} N of it",
             -left
         ),
         (true, None) => String::new(),
@@ -84,12 +84,12 @@ fn first_run(of: &Finding, left: Option<f64>) -> String {
 
 fn creep(of: &Finding, decades: usize, plateau: Option<&Estimate>) -> String {
     let plateau = plateau.map_or_else(String::new, |p| {
-        format!("; at the top pressure the force of shortened mountings creeps by {} a decade", newtons(p))
+        format!("; at the top pressure the force of shortened mountings creeps by {} per decade", newtons(p))
     });
     let a_decade = |share: f64| 100.0 * share / decades as f64;
     format!(
-        "the part of the pressure that the bladder carries relaxes by {:.1} ± {:.1} % a decade of time, over {decades} decades, and the next run \
-         remembers it{plateau}",
+        "the part of the pressure that the bladder carries relaxes by {:.1} ± {:.1} % per decade of time, over {decades} decades, and the next run \
+         starts from this state{plateau}",
         a_decade(of.size.value),
         a_decade(of.size.half().unwrap_or(f64::INFINITY))
     )
@@ -164,7 +164,7 @@ fn slack_reading(of: &Finding, grows: Option<f64>) -> String {
         );
     }
     let cause = match (of.found, of.size.value > 0.0) {
-        (false, _) => "",
+        (false, _) => ": too small, or too uncertain, for a finding",
         (true, true) => ": the zero of the cell is off, or a weight hangs on it",
         (true, false) => ": the zero of the cell is off, or the slack tube pushes",
     };

@@ -20,14 +20,14 @@ pub fn verdict(d: &Diagnosis) -> String {
             "These recordings do not allow a judgement of the model.".to_owned()
         }
         Verdict::Consistent if one_bladder_misfits(d) => {
-            "Model and recordings agree at each pressure, but one bladder does not describe all pressures.".to_owned()
+            "Model and recordings agree at each pressure, but one bladder does not describe all pressures."
+                .to_owned()
         }
         Verdict::Consistent => {
-            "Model and recordings agree: no error exceeds the noise and the model's stated inexactness.".to_owned()
+            "Model and recordings agree: no error exceeds the noise and the model's stated inexactness."
+                .to_owned()
         }
-        Verdict::Explained if d.missing.iter().any(|m| !m.supported) => {
-            "With the effects that were given, no error exceeds the noise. The recordings do not support all of them.".to_owned()
-        }
+        Verdict::Explained if d.missing.iter().any(|m| !m.supported) => given(d),
         Verdict::Explained => match d.explained_beside_small_rest() {
             None => format!("The model lacks {}. This explains its error above the noise.", list(&names)),
             Some(share) => format!(
@@ -43,9 +43,23 @@ pub fn verdict(d: &Diagnosis) -> String {
             noise(&d.unexplained.pattern)
         }
         Verdict::Unexplained => {
-            "The model lacks something, but no effect of the library explains it well enough to be named.".to_owned()
+            "The model lacks something, but no effect of the library explains it well enough to be named."
+                .to_owned()
         }
     }
+}
+
+/// What effects that were given, of which the recordings do not support all, leave: for the verdict "explained".
+#[must_use]
+pub fn given(d: &Diagnosis) -> String {
+    let unsupported: Vec<String> =
+        d.missing.iter().filter(|m| !m.supported).map(|m| format!("`{}`", m.effect)).collect();
+    let share = 100.0 * (1.0 - d.unexplained.share).clamp(0.0, 1.0);
+    format!(
+        "The given effects explain {share:.0} % of the model's error above the noise; the rest is within the model's stated inexactness. The \
+         recordings do not support {}.",
+        list(&unsupported)
+    )
 }
 
 /// An error that does not repeat is noise, whatever its size: no law of the muscle makes it.

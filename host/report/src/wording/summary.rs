@@ -107,6 +107,7 @@ fn header(s: &mut String, d: &Diagnosis) {
             100.0 * share
         ),
     };
+    let given = format!("GIVEN EFFECTS FITTED: {}", super::outcome::given(d));
     let _ = writeln!(
         s,
         "\n{}",
@@ -117,8 +118,7 @@ fn header(s: &mut String, d: &Diagnosis) {
                 "CONSISTENT AT EACH PRESSURE: no error exceeds the noise there, but one bladder does not describe all pressures.",
             Verdict::Consistent =>
                 "CONSISTENT: no error exceeds the noise and the model's stated inexactness.",
-            Verdict::Explained if d.missing.iter().any(|m| !m.supported) =>
-                "AS GIVEN: with the effects that were given, no error exceeds the noise. The recordings do not support all of them.",
+            Verdict::Explained if d.missing.iter().any(|m| !m.supported) => &given,
             Verdict::Explained => &explained,
             Verdict::PartlyExplained =>
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
@@ -150,7 +150,7 @@ fn effect(s: &mut String, m: &Missing) {
     };
     let _ = writeln!(s, "\n{name}, acts on {}", place(m.place));
     let _ = writeln!(s, "  {}", m.summary);
-    let _ = writeln!(s, "  evidence: {}; largest force {:.2} N", why(&m.why), m.peak_N);
+    let _ = writeln!(s, "  evidence: {}; largest contribution {:.2} N", why(&m.why), m.peak_N);
     // Of alternative laws those that were not chosen are zero.
     for p in m.parameters.iter().filter(|p| p.value != 0.0) {
         let odd = if p.outside_known_range { "   outside the published range" } else { "" };

@@ -153,7 +153,7 @@ pub fn warnings(visits: &[Visit], found: &Timeline) -> Vec<String> {
     }
     if found.series.iter().any(|(_, c)| c.too_few) {
         all.push(
-            "with fewer than four campaigns a quantity is shown, and no change of it is judged; the comparison with the reference is"
+            "quantities of fewer than four campaigns are shown without a test for changes; each campaign is still compared with the reference"
                 .to_owned(),
         );
     }
@@ -210,7 +210,7 @@ pub fn headline(found: &Timeline) -> String {
     } else if unexplained {
         "Some campaigns differ from the reference in a way that no known change describes.".to_owned()
     } else {
-        "Nothing changed over these campaigns beyond what the actuator does anyway.".to_owned()
+        "No change over these campaigns beyond the normal repeatability of the actuator.".to_owned()
     }
 }
 

@@ -400,7 +400,8 @@ fn what_is_missing(sample: &Sample, guess: &mut Guess) {
     let stroke_is_noted = stroke.iter().any(|q| is_noted(guess, *q));
     if !stroke.iter().any(|q| guess.has(*q) || caught(guess, *q)) && !stroke_is_noted {
         let text = "no column of displacement, length or contraction: where the length is held, write it as length_mm \
-                    under [constants], or give the files of all lengths, whose names say it";
+                    under [constants], or give the files of all lengths, whose names say it; if several columns of force each belong to a \
+                    length, use [grid] (book, File formats)";
         guess.unknown.push(text.into());
     }
     if !guess.has(Quantity::Force) && !is_noted(guess, Quantity::Force) {
