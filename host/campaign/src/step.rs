@@ -74,7 +74,7 @@ pub enum Step {
     },
     /// A check of the bench without the muscle.
     Check {
-        /// Which.
+        /// Which check it is.
         check: checks::Kind,
     },
 }

@@ -38,7 +38,7 @@ pub enum Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mishap {
-    /// Nothing.
+    /// Nothing goes wrong.
     None = 0,
     /// The load cell's wire breaks: its reading leaves its range.
     LoadCell = 1,

@@ -154,7 +154,7 @@ pub struct HeldOut {
     pub noise_N: f64,
     /// The same two with the samples about each turn left in.
     pub with_turns_before_N: f64,
-    /// After.
+    /// Error with the effects, likewise, N.
     pub with_turns_after_N: f64,
 }
 
@@ -236,7 +236,7 @@ pub struct Profile {
 /// A residual over time, thinned for drawing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trace {
-    /// s.
+    /// Time of each sample, s.
     pub time: Vec<f64>,
     /// Before, N.
     pub before: Vec<f64>,

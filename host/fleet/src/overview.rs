@@ -41,7 +41,7 @@ pub struct Effect {
     pub effect: String,
     /// Whether it is the bench's.
     pub bench: bool,
-    /// Muscles.
+    /// Number of muscles with this effect.
     pub muscles: usize,
     /// Share of the diagnosed muscles.
     pub share: f64,

@@ -34,7 +34,7 @@ pub struct Demonstration {
 /// One effect on the demonstration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
-    /// Which.
+    /// The effect.
     pub candidate: Candidate,
     /// Its parameters in SI units: shapes in the middle of their plausible range, amplitudes as large as drawn.
     pub parameters: Vec<f64>,

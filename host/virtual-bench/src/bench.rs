@@ -18,7 +18,7 @@ pub struct BenchSpec {
     /// Frame, joints and moving mass.
     #[serde(default)]
     pub rig: Rig,
-    /// Instruments.
+    /// Sensors of pressure, stroke, and force, with their errors.
     pub instruments: Instruments,
     /// Seed of all noise.
     pub seed: u64,

@@ -46,7 +46,7 @@ pub struct Physics {
     /// Softening by work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wear: Option<Wear>,
-    /// Heat.
+    /// Heat of friction and hysteresis, which changes elastic force and friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heat: Option<Heat>,
     /// The bladder meets the braid unevenly as it widens: pressure lost is `p (1 − (R0/R)²)`, p in Pa.

@@ -33,11 +33,11 @@ pub struct Recording {
 /// Which optional columns are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Columns {
-    /// `pressure_command_kPa`
+    /// Whether the column `pressure_command_kPa` is written.
     pub command: bool,
-    /// `temperature_C`
+    /// Whether the column `temperature_C` is written.
     pub temperature: bool,
-    /// `cycle`
+    /// Whether the column `cycle` is written.
     pub cycle: bool,
 }
 

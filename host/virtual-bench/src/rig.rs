@@ -54,7 +54,7 @@ const SOLUTION_STEPS: usize = 60;
 const GUIDE_TRAVEL: f64 = 20e-6;
 
 impl RigState {
-    /// Unloaded.
+    /// A rig that has not been loaded yet.
     pub fn new(with: Rig) -> Self {
         Self { with, played: None, last: None, guide: 0.0, stuck: 0.0, clock: 0.0 }
     }

@@ -22,7 +22,7 @@ pub struct CovarianceRoot {
     pub rows: usize,
     /// Columns: one per block.
     pub columns: usize,
-    /// `S`.
+    /// The entries of `S`, row after row.
     pub s: Vec<f64>,
 }
 
