@@ -92,7 +92,7 @@ impl CovarianceRoot {
 
     /// The root of `A C Aᵀ`, `A` given row after row.
     #[must_use]
-    pub fn transformed(&self, a: &[Vec<f64>]) -> Self {
+    pub(crate) fn transformed(&self, a: &[Vec<f64>]) -> Self {
         let mut s = Vec::with_capacity(a.len() * self.columns);
         for row in a {
             let mut to = vec![0.0; self.columns];
