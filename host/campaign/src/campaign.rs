@@ -56,7 +56,7 @@ pub trait Observer {
 
 /// No observer.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Alone;
+pub(crate) struct Alone;
 
 impl Observer for Alone {}
 

@@ -207,7 +207,7 @@ impl Step {
 
     /// Whether the length is held shorter than the rest length.
     #[must_use]
-    pub fn is_held_shortened(&self) -> bool {
+    pub(crate) fn is_held_shortened(&self) -> bool {
         matches!(self, Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0)
     }
 
