@@ -229,12 +229,6 @@ impl Emulated {
         &self.address
     }
 
-    /// Why it does not run in QEMU, where that was left open.
-    #[must_use]
-    pub fn why_native(&self) -> Option<&str> {
-        self.why_native.as_deref()
-    }
-
     /// As text, for people.
     #[must_use]
     pub fn description(&self) -> String {

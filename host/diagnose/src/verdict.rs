@@ -63,7 +63,7 @@ impl ParameterValue {
 
     /// Whether a value lies outside what the literature knows; one that is not used does not.
     #[must_use]
-    pub fn is_outside(value: f64, parameter: &Parameter) -> bool {
+    pub(crate) fn is_outside(value: f64, parameter: &Parameter) -> bool {
         let (low, high) = (parameter.low, parameter.high);
         let too_small = value.abs() < low.abs().min(high.abs()) && low * high > 0.0;
         value != 0.0 && (value.abs() > parameter.largest() || too_small)

@@ -105,7 +105,7 @@ impl Overview {
 
     /// How many muscles are outlying in at least one quantity.
     #[must_use]
-    pub fn outlying_muscles(&self) -> usize {
+    pub(crate) fn outlying_muscles(&self) -> usize {
         let mut members: Vec<usize> = self.outlying.iter().map(|o| o.member).collect();
         members.sort_unstable();
         members.dedup();

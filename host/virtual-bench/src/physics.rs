@@ -1,5 +1,5 @@
 //! Physics beyond the quasi-static muscle, each of which can be switched on apart: [`Physics`] names what is on,
-//! [`PhysicsState`] carries the memory.
+//! `PhysicsState` carries the memory.
 
 pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Temperatures, Wear};
 pub use crate::rubbing::{Activated, Ageing, Relays, RubbingState, Seal, Slow, StrandContact, Viscous};
@@ -129,7 +129,7 @@ pub struct BristleDamping {
 
 /// What the muscle is doing in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Moment {
+pub(crate) struct Moment {
     /// Step, s.
     pub dt: f64,
     /// Pressure in the muscle, Pa.
@@ -154,7 +154,7 @@ impl Moment {
 
 /// Memory of everything in [`Physics`].
 #[derive(Debug, Clone)]
-pub struct PhysicsState {
+pub(crate) struct PhysicsState {
     on: Physics,
     relaxation: Branches,
     creep: Branches,
@@ -303,7 +303,7 @@ impl PhysicsState {
     }
 
     /// How much longer the muscle has become, m.
-    pub fn rest_shift(&self) -> f64 {
+    pub(crate) fn rest_shift(&self) -> f64 {
         let slipped = self.on.slip.map_or(0.0, |s| s.travel * ((self.clock - s.time) / 0.05).clamp(0.0, 1.0));
         slipped + self.set
     }

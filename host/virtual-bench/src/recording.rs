@@ -44,7 +44,7 @@ pub struct Columns {
 /// Newtons of one pound-force.
 const POUND_FORCE: f64 = 4.448_221_615_260_5;
 /// Pounds-force of one unit of the thesis's load-cell reading.
-pub const LOAD_CELL: f64 = 508.41;
+pub(crate) const LOAD_CELL: f64 = 508.41;
 
 impl Recording {
     /// CSV with `time_s,pressure_kPa,displacement_mm,force_N` and the optional columns requested.

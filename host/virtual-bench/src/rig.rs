@@ -36,7 +36,7 @@ pub struct Rig {
 
 /// The rig's memory.
 #[derive(Debug, Clone)]
-pub struct RigState {
+pub(crate) struct RigState {
     with: Rig,
     played: Option<f64>,
     last: Option<(f64, f64)>,
@@ -124,7 +124,7 @@ impl RigState {
     }
 
     /// Force at the cell, N.
-    pub fn at_cell(&mut self, force: f64, pressure: f64, stroke: f64, dt: f64) -> f64 {
+    pub(crate) fn at_cell(&mut self, force: f64, pressure: f64, stroke: f64, dt: f64) -> f64 {
         let w = &self.with;
         self.clock += dt;
         let (x, v) = self.last.unwrap_or((stroke, 0.0));
