@@ -1,9 +1,12 @@
 //! Physics beyond the quasi-static muscle, each of which can be switched on apart: [`Physics`] names what is on,
 //! `PhysicsState` carries the memory.
 
-pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Temperatures, Wear};
-pub use crate::rubbing::{Activated, Ageing, Relays, RubbingState, Seal, Slow, StrandContact, Viscous};
-pub use crate::wall_creep::{LoadHistory, WallCreep};
+use crate::rubber::Temperatures;
+pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Wear};
+use crate::rubbing::RubbingState;
+pub use crate::rubbing::{Activated, Ageing, Relays, Seal, Slow, StrandContact, Viscous};
+use crate::wall_creep::LoadHistory;
+pub use crate::wall_creep::WallCreep;
 use serde::{Deserialize, Serialize};
 
 /// What is switched on; everything off is the quasi-static muscle with bristle friction.

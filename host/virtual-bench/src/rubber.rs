@@ -111,7 +111,7 @@ pub struct Heat {
 
 /// Temperatures above the room, K.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Temperatures {
+pub(crate) struct Temperatures {
     /// Of the bladder.
     pub bladder: f64,
     /// Of the fittings.
