@@ -169,7 +169,7 @@ impl Controller {
         self.machine.faults()
     }
 
-    /// Mode.
+    /// What the controller controls.
     pub fn mode(&self) -> Mode {
         self.mode
     }

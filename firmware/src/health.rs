@@ -132,7 +132,7 @@ pub struct Health {
 /// Work on a whole block, in the order of the ticks that do it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Due {
-    /// None.
+    /// No work is due.
     Nothing,
     /// Its means.
     Means,
@@ -155,7 +155,7 @@ impl Default for Health {
 }
 
 impl Health {
-    /// Empty.
+    /// No samples and no blocks yet.
     pub const fn new(scales: Scales) -> Self {
         Self {
             scales,

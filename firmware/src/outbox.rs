@@ -21,9 +21,9 @@ pub struct Sample {
     pub tick: u64,
     /// State of safety.
     pub state: State,
-    /// Mode.
+    /// What the controller controls.
     pub mode: Mode,
-    /// the setpoint, in the unit of the mode.
+    /// The setpoint, in the unit of the mode.
     pub setpoint: f32,
     /// A pair's second value.
     pub setpoint_second: f32,

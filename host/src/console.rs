@@ -56,9 +56,9 @@ pub fn unprinted() -> Option<Error> {
 pub enum Colour {
     /// On a terminal only, and not where the environment variable `NO_COLOR` is set.
     OnTerminal,
-    /// Always.
+    /// Always, on a terminal or not.
     Always,
-    /// Never.
+    /// Never, even on a terminal.
     Never,
 }
 

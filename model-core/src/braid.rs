@@ -24,13 +24,13 @@ pub struct Braid<T> {
     rest_radius: T,
     inv_rest_radius: T,
     fibre_squared: T,
-    /// `1/(2πN)²`.
+    /// `1/(2πN)²`: `R²` for each `B² − L²`.
     widening: T,
-    /// `3/(4πN²)`.
+    /// `3/(4πN²)`: the part of the effective area for each `L²`.
     three_inv_four_pi_turns_squared: T,
-    /// `B²/(4πN²)`.
+    /// `B²/(4πN²)`, m²: the part of the effective area that does not depend on the length.
     fibre_area: T,
-    /// `1/(2πN²)`.
+    /// `1/(2πN²)`: the hoop area for each `t L²/R`.
     inv_two_pi_turns_squared: T,
     bladder_volume: T,
     bladder_volume_over_pi: T,

@@ -159,7 +159,7 @@ pub enum Link {
     Bladder,
     /// The bladder's memory of the past.
     Memory,
-    /// Friction.
+    /// Friction: the force that depends on the direction or speed of motion.
     Friction,
     /// Masses and springs between the muscle and the load cell.
     LoadPath,

@@ -15,11 +15,11 @@ pub struct Motion<T> {
     pub time: T,
     /// `ΔL`, m.
     pub stroke: T,
-    /// m/s, positive while shortening.
+    /// Rate of the stroke, m/s, positive while shortening.
     pub speed: T,
-    /// m/s².
+    /// Rate of the speed, m/s².
     pub acceleration: T,
-    /// Pa/s.
+    /// Rate of the gauge pressure, Pa/s, positive while filling.
     pub pressure_rate: T,
     /// +1 shortening, −1 lengthening, 0 unknown.
     pub direction: T,
@@ -217,7 +217,7 @@ pub struct Slide<T> {
 }
 
 impl<T: Scalar> Slide<T> {
-    /// `d/d_i`.
+    /// `d/d_i`: stiffness of each slider; the mean of the distances `d_i` is nearly `d`.
     const STIFFNESS: [f32; 3] = [1.0 / 0.3, 1.0 / 0.8, 1.0 / 1.8];
 
     /// Takes a travel, in distances `d`, positive while shortening; gives the direction.

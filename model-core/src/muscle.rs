@@ -45,7 +45,7 @@ pub(crate) struct Piece<T> {
     pub(crate) origin: T,
     /// `E_1…E_M`, and zeros up to the largest order.
     pub(crate) elastic: [Cubic<T>; MAX_ORDER],
-    /// `k_F`.
+    /// Friction factor `k_F`.
     pub(crate) friction: Cubic<T>,
 }
 
@@ -402,7 +402,7 @@ impl<T: Scalar> Muscle<T> {
     pub fn braid(&self) -> &Braid<T> {
         &self.braid
     }
-    /// `P0`.
+    /// Deadband `P0`: the gauge pressure at which the muscle begins to contract.
     pub fn deadband(&self) -> Pressure<T> {
         Pressure::from_pascals(self.deadband)
     }

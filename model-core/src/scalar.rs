@@ -26,9 +26,9 @@ pub trait Scalar:
     + Sync
     + 'static
 {
-    /// 0.
+    /// The number 0.
     const ZERO: Self;
-    /// 1.
+    /// The number 1.
     const ONE: Self;
     /// The distance from 1 to the next number.
     const EPSILON: Self;

@@ -10,7 +10,7 @@ use crate::motion::{Motion, MotionTracker};
 use crate::muscle::{AtStroke, Muscle, OperatingPoint, Parts, StrokeSlopes};
 use crate::units::{Force, Length, Pressure};
 
-/// [`Muscle::force`].
+/// Force of the base model: [`Muscle::force`].
 #[inline(never)]
 pub fn force(
     muscle: &Muscle<f32>,
@@ -48,13 +48,13 @@ fn refresh_slopes(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, slopes: &mut 
     *slopes = muscle.slopes(at_stroke);
 }
 
-/// [`Muscle::parts`].
+/// Parts of the base model's force at a held stroke: [`Muscle::parts`].
 #[inline(never)]
 pub fn parts(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, pressure: Pressure<f32>) -> Parts<f32> {
     muscle.parts(at_stroke, pressure)
 }
 
-/// [`Muscle::stroke_slope`].
+/// Slope of the force over the stroke, N/m: [`Muscle::stroke_slope`].
 pub fn stroke_slope(muscle: &Muscle<f32>, at_stroke: &AtStroke<f32>, pressure: Pressure<f32>) -> f32 {
     parts_and_stiffness(muscle, at_stroke, pressure).1
 }
@@ -69,7 +69,7 @@ pub fn parts_and_stiffness(
     muscle.parts_and_stiffness(at_stroke, &muscle.slopes(at_stroke), pressure)
 }
 
-/// [`Muscle::pressure_for`].
+/// Pressure at which the base model gives a force: [`Muscle::pressure_for`].
 #[inline(never)]
 pub fn pressure_for(
     muscle: &Muscle<f32>,
@@ -95,7 +95,7 @@ pub fn pressure_at(
     muscle.pressure_for(force, &muscle.at_stroke(stroke), direction, guess, search)
 }
 
-/// [`Muscle::pressure_with`].
+/// Pressure at which the model with its effects gives a force: [`Muscle::pressure_with`].
 #[inline(never)]
 pub fn pressure_with(
     muscle: &Muscle<f32>,
@@ -112,7 +112,7 @@ pub fn pressure_with(
     pressure_for(muscle, &point.at_stroke, point.context.direction, rest, guess, search)
 }
 
-/// [`Muscle::update`].
+/// Brings an operating point to the present motion and pressure: [`Muscle::update`].
 #[inline(never)]
 pub fn update(
     muscle: &Muscle<f32>,
@@ -125,19 +125,19 @@ pub fn update(
     muscle.fill_context(point, motion, pressure);
 }
 
-/// [`Chain::step`].
+/// Lets time pass in the memory of all effects: [`Chain::step`].
 #[inline(never)]
 pub fn step(chain: &mut Chain<f32>, context: &Context<f32>) {
     chain.step(context);
 }
 
-/// [`Chain::force`].
+/// Force of all effects together, N: [`Chain::force`].
 #[inline(never)]
 pub fn effects(chain: &Chain<f32>, context: &Context<f32>) -> f32 {
     chain.force(context)
 }
 
-/// [`MotionTracker::step`].
+/// Gives the motion after the next readings: [`MotionTracker::step`].
 #[inline(never)]
 pub fn follow(tracker: &mut MotionTracker<f32>, dt: f32, stroke: f32, pressure: f32) -> &Motion<f32> {
     tracker.step(dt, stroke, pressure)

@@ -15,7 +15,7 @@ impl Integral {
         self.0
     }
 
-    /// Forgets.
+    /// Sets its value to zero.
     pub fn reset(&mut self) {
         self.0 = 0.0;
     }

@@ -53,7 +53,7 @@ pub fn diagnosed(
 
 /// Each name of a diagnosis with those that it is confusable with, by probability.
 #[must_use]
-pub fn sets(diagnosis: &Diagnosis) -> Vec<Vec<Hypothesis>> {
+pub(crate) fn sets(diagnosis: &Diagnosis) -> Vec<Vec<Hypothesis>> {
     diagnosis.missing.iter().filter(|m| !is_from_history(m)).filter_map(set).collect()
 }
 

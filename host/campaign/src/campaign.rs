@@ -28,7 +28,7 @@ pub struct Done {
     pub chosen: Chosen,
     /// Its recording or table; empty where nothing was recorded.
     pub file: String,
-    /// Rows.
+    /// Number of rows of its recording; 0 where it recorded no rows, as for a check of the bench.
     pub rows: u64,
     /// Clock at its beginning and end, s.
     pub clock_s: (f64, f64),
@@ -56,7 +56,7 @@ pub trait Observer {
 
 /// No observer.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Alone;
+pub(crate) struct Alone;
 
 impl Observer for Alone {}
 

@@ -39,7 +39,7 @@ pub struct Course {
 }
 
 /// Time in which a muscle vents, s.
-pub const VENT_S: f64 = 2.0;
+pub(crate) const VENT_S: f64 = 2.0;
 
 impl Course {
     /// Adds a segment that is recorded.
@@ -102,7 +102,7 @@ impl Course {
 
 /// How long a segment takes from a pressure (Pa) and a stroke (m), s.
 #[must_use]
-pub fn duration(segment: &Segment, pressure: f64, stroke: f64) -> f64 {
+pub(crate) fn duration(segment: &Segment, pressure: f64, stroke: f64) -> f64 {
     match *segment {
         Segment::Travel { to, speed, .. } => (to - stroke).abs() / speed.max(1e-9),
         Segment::Ramp { to, rate } => (to - pressure).abs() / rate.max(1e-9),

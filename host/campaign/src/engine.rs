@@ -36,7 +36,7 @@ pub enum Decision {
 }
 
 /// The last tare of a campaign: without it a drift of the zero cannot be seen.
-pub const CLOSING: Step = Step::Tare { seconds: 10.0 };
+pub(crate) const CLOSING: Step = Step::Tare { seconds: 10.0 };
 
 /// Everything that a decision depends on.
 #[derive(Debug)]
@@ -224,7 +224,7 @@ impl Engine {
     }
 
     /// Takes rows of an interrupted step: they are recordings like others, and the step is still to do.
-    pub fn add_rows(&mut self, recording: Recording) {
+    pub(crate) fn add_rows(&mut self, recording: Recording) {
         self.recordings.push(recording);
     }
 
@@ -236,7 +236,7 @@ impl Engine {
     }
 
     /// Takes a check of the bench.
-    pub fn add_check(&mut self, check: checks::Kind, file: PathBuf) {
+    pub(crate) fn add_check(&mut self, check: checks::Kind, file: PathBuf) {
         self.steps.push(Step::Check { check });
         self.checks.push((check, file));
         // It may settle everything.

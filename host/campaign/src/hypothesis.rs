@@ -5,7 +5,7 @@ use pam_fit::bench::Candidate;
 
 /// One effect that the diagnosis holds possible, and how probable it is.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hypothesis {
+pub(crate) struct Hypothesis {
     /// The effect.
     pub law: Candidate,
     /// Its probability within its set.
@@ -38,7 +38,7 @@ pub(crate) fn entropy(set: &[Hypothesis], apart: impl Fn(usize, usize) -> f64) -
 
 /// Effects that a campaign checks for: all but those that only the order of the polynomial imitates.
 #[must_use]
-pub fn candidates() -> Vec<Candidate> {
+pub(crate) fn candidates() -> Vec<Candidate> {
     Candidate::all()
         .filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders) && !l.traits().between_recordings)
         .collect()

@@ -32,7 +32,7 @@ const PAUSE_S: f64 = 10.0;
 
 /// What is known when a step is chosen.
 #[derive(Debug, Clone)]
-pub struct Knowledge<'a> {
+pub(crate) struct Knowledge<'a> {
     /// The fitted model.
     pub model: &'a Muscle<f64>,
     /// Everything recorded so far.
@@ -82,7 +82,7 @@ impl Gain {
 
 /// The design that all candidates are judged on.
 #[derive(Debug)]
-pub struct Design<'a> {
+pub(crate) struct Design<'a> {
     known: Knowledge<'a>,
     past: Vec<Recording>,
     table: Table,

@@ -20,7 +20,7 @@ use crate::actuation::Reading;
 mod event;
 
 /// Name of the log in the campaign's folder.
-pub const JOURNAL: &str = "journal.jsonl";
+pub(crate) const JOURNAL: &str = "journal.jsonl";
 /// Time between two pieces of rows on the disk.
 const PIECE: Duration = Duration::from_millis(200);
 /// Columns of every recording.
@@ -31,7 +31,7 @@ const SPOILED: &str = ".csv.spoiled";
 
 /// How the recording of a step ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Completion {
+pub(crate) enum Completion {
     /// As planned.
     Whole,
     /// Interrupted: its rows are fitted like others.
@@ -164,7 +164,7 @@ impl Journal {
     ///
     /// # Errors
     /// [`DataCode::FileUnwritable`].
-    pub fn finish(&mut self, completion: Completion) -> Result<(String, u64)> {
+    pub(crate) fn finish(&mut self, completion: Completion) -> Result<(String, u64)> {
         let Some(mut part) = self.part.take() else { return Ok((String::new(), 0)) };
         part.sync()?;
         let file = free_name(&self.folder, &part.name, completion);
@@ -283,7 +283,7 @@ fn free_name(folder: &Path, name: &str, completion: Completion) -> String {
 
 /// Seconds since 1970.
 #[must_use]
-pub fn unix_seconds() -> u64 {
+pub(crate) fn unix_seconds() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())
 }
 

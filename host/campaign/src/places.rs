@@ -134,7 +134,7 @@ impl Places {
 
     /// Takes what a recording at a held stroke shows: the line from the blocked force through its force at the highest level meets zero
     /// near the free stroke, and before it, because the force falls more slowly the shorter the muscle is.
-    pub fn learn_held(&mut self, recording: &Recording) {
+    pub(crate) fn learn_held(&mut self, recording: &Recording) {
         let Some(force) = &recording.force else { return };
         let stroke = recording.stroke.iter().copied().fold(0.0, f64::max);
         let rows = recording.pressure.iter().zip(&recording.stroke).zip(force);
@@ -156,7 +156,7 @@ impl Places {
     }
 
     /// Takes that the muscle hung slack at this held stroke, m, even at the highest level.
-    pub fn learn_slack(&mut self, stroke: f64) {
+    pub(crate) fn learn_slack(&mut self, stroke: f64) {
         if stroke > 0.0 {
             self.slack_from = self.slack_from.min(stroke);
             self.free = self.free.min(self.longest());
@@ -176,7 +176,7 @@ impl Places {
     }
 
     /// Takes the free stroke from a model where no stroke at the highest level was recorded.
-    pub fn learn_stroke_of(&mut self, model: &Muscle<f64>) {
+    pub(crate) fn learn_stroke_of(&mut self, model: &Muscle<f64>) {
         if !(self.free > 0.0) {
             self.free = pam_diagnose::protocol_simulation::free_stroke(model, self.top).min(self.stroke_max);
         }
@@ -233,7 +233,7 @@ impl Places {
 
     /// Force at which a stroke turns, N.
     #[must_use]
-    pub fn free_force(&self) -> f64 {
+    pub(crate) fn free_force(&self) -> f64 {
         FREE_FORCE * self.blocked
     }
 
@@ -257,7 +257,7 @@ impl Places {
 
     /// Least pressure at which the free stroke is at least this, Pa; zero for none.
     #[must_use]
-    pub fn pressure_that_reaches(&self, stroke: f64) -> f64 {
+    pub(crate) fn pressure_that_reaches(&self, stroke: f64) -> f64 {
         if stroke <= 0.0 {
             return 0.0;
         }

@@ -10,7 +10,7 @@ pub enum Purpose {
     Fit,
     /// What the model leaves out.
     Diagnosis,
-    /// Both.
+    /// The force table and what the model leaves out.
     #[default]
     Both,
 }

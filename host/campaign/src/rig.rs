@@ -41,7 +41,7 @@ impl Axis {
 
     /// Whether other held lengths than the present one are possible.
     #[must_use]
-    pub const fn positions(self) -> bool {
+    pub(crate) const fn positions(self) -> bool {
         matches!(self, Self::Prompt | Self::Line | Self::Commanded)
     }
 }

@@ -74,7 +74,7 @@ pub enum Step {
     },
     /// A check of the bench without the muscle.
     Check {
-        /// Which.
+        /// Which check it is.
         check: checks::Kind,
     },
 }
@@ -207,7 +207,7 @@ impl Step {
 
     /// Whether the length is held shorter than the rest length.
     #[must_use]
-    pub fn is_held_shortened(&self) -> bool {
+    pub(crate) fn is_held_shortened(&self) -> bool {
         matches!(self, Self::Ramps { part } | Self::Staircase { part, .. } if *part > 0.0)
     }
 

@@ -11,7 +11,7 @@ use crate::step::Step;
 
 /// Limits of muscle and rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Highest pressure of a command, Pa.
     pub pressure: f64,
     /// Largest force, N.
@@ -61,7 +61,7 @@ impl fmt::Display for Spoiled {
 
 /// Why the campaign must end immediately.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Danger {
+pub(crate) enum Danger {
     /// Measured pressure, Pa.
     Pressure(f64),
     /// Measured force, N.
@@ -85,7 +85,7 @@ impl fmt::Display for Danger {
 
 /// The readings of one step, judged as they come.
 #[derive(Debug)]
-pub struct Watch {
+pub(crate) struct Watch {
     limits: Limits,
     top: f64,
     blocked: f64,

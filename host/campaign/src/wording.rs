@@ -8,27 +8,27 @@ use crate::purpose::Purpose;
 use crate::step::Step;
 
 /// Why a campaign ends with a tare.
-pub const CLOSING: &str = "Zeros at the end show whether the instruments drifted.";
+pub(crate) const CLOSING: &str = "Zeros at the end show whether the instruments drifted.";
 /// Why a step was chosen before the first table.
-pub const NO_TABLE: &str =
+pub(crate) const NO_TABLE: &str =
     "The recordings do not determine a table yet, so the steps of the menu are made in their order.";
 /// Why a campaign ends although not everything is known.
-pub const NOTHING_MORE: &str =
+pub(crate) const NOTHING_MORE: &str =
     "No step that this rig can do within the time left is expected to give more information.";
 
 /// Why a plan ends before there is a table.
-pub const PLAN_AGAIN: &str =
+pub(crate) const PLAN_AGAIN: &str =
     "These steps come first; plan again with their recordings, which decide what follows.";
 
 /// Why a plan ends that has as many steps as requested.
 #[must_use]
-pub fn plan_is_full(steps: usize) -> String {
+pub(crate) fn plan_is_full(steps: usize) -> String {
     format!("The plan has the requested number of steps, {steps}.")
 }
 
 /// Why a step was chosen, with its expected information, in one sentence.
 #[must_use]
-pub fn why_with_gain(why: &str, gain: &Gain) -> String {
+pub(crate) fn why_with_gain(why: &str, gain: &Gain) -> String {
     format!(
         "{} (expected information in nats: table {:.2}, choice between effects {:.2}, undetected effects {:.2}).",
         why.trim_end_matches('.'),
@@ -40,7 +40,7 @@ pub fn why_with_gain(why: &str, gain: &Gain) -> String {
 
 /// Why a step was chosen.
 #[must_use]
-pub fn why(gain: &Gain, diagnosis: Option<&Diagnosis>, step: &Step) -> String {
+pub(crate) fn why(gain: &Gain, diagnosis: Option<&Diagnosis>, step: &Step) -> String {
     if let Step::Rest { .. } = step {
         return "After a rest the muscle shows what it remembers of earlier loads.".into();
     }
@@ -82,7 +82,7 @@ pub fn table(before: Option<f64>, findings: Option<&Findings>) -> String {
 
 /// What a diagnosis changed.
 #[must_use]
-pub fn diagnosis(earlier: Option<&[String]>, now: &Diagnosis) -> String {
+pub(crate) fn diagnosis(earlier: Option<&[String]>, now: &Diagnosis) -> String {
     let list = |n: &[String]| if n.is_empty() { "nothing".to_owned() } else { n.join(", ") };
     let names = names(now);
     match earlier {
@@ -94,7 +94,7 @@ pub fn diagnosis(earlier: Option<&[String]>, now: &Diagnosis) -> String {
 
 /// Why a campaign that reached its aim ended.
 #[must_use]
-pub fn settled(diagnosis: Option<&Diagnosis>, purpose: Purpose) -> String {
+pub(crate) fn settled(diagnosis: Option<&Diagnosis>, purpose: Purpose) -> String {
     match (purpose, diagnosis) {
         (Purpose::Fit, _) | (_, None) => "The table is known to the target error.".into(),
         (_, Some(d)) if d.missing.is_empty() => {
@@ -109,10 +109,10 @@ pub fn settled(diagnosis: Option<&Diagnosis>, purpose: Purpose) -> String {
 }
 
 /// How the reason of a campaign begins that ended at its limit.
-pub const TIME_IS_OVER: &str = "The time of";
+pub(crate) const TIME_IS_OVER: &str = "The time of";
 
 /// Why a campaign ended at its limit.
 #[must_use]
-pub fn time_is_over(budget_s: f64) -> String {
+pub(crate) fn time_is_over(budget_s: f64) -> String {
     format!("{TIME_IS_OVER} {:.0} min is used.", budget_s / 60.0)
 }

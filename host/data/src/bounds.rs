@@ -8,7 +8,7 @@ use crate::error::{DataCode, Error, Result};
 
 /// Values of one campaign, 8 bytes each: 400 MB, so that the columns of a file and their conversion to SI stay under 1 GiB. Force,
 /// pressure, stroke and time at 1 kHz fill them in three and a half hours.
-pub const VALUES: usize = 48 << 20;
+pub(crate) const VALUES: usize = 48 << 20;
 /// Bytes of a container that is taken into memory whole, packed or unpacked. Its readers hold up to four copies of a value at a time:
 /// as stored, as a number, as a matrix and as a column.
 pub const WHOLE: u64 = 128 << 20;
@@ -17,7 +17,7 @@ pub const WRITTEN: u64 = 16 << 20;
 
 /// Values that may still be taken.
 #[derive(Debug, Clone, Copy)]
-pub struct Budget {
+pub(crate) struct Budget {
     left: usize,
     all: usize,
 }
@@ -31,13 +31,13 @@ impl Default for Budget {
 impl Budget {
     /// For a number of values.
     #[must_use]
-    pub fn new(values: usize) -> Self {
+    pub(crate) fn new(values: usize) -> Self {
         Self { left: values, all: values }
     }
 
     /// For the values of a container that is taken into memory whole.
     #[must_use]
-    pub fn whole() -> Self {
+    pub(crate) fn whole() -> Self {
         Self::new(WHOLE as usize / size_of::<f64>())
     }
 
@@ -45,7 +45,7 @@ impl Budget {
     ///
     /// # Errors
     /// [`DataCode::FileUnreadable`] where there are not as many left.
-    pub fn take(&mut self, values: usize) -> Result<()> {
+    pub(crate) fn take(&mut self, values: usize) -> Result<()> {
         match self.left.checked_sub(values) {
             Some(left) => {
                 self.left = left;

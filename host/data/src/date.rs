@@ -88,7 +88,7 @@ pub fn time_stamp(text: &str) -> Option<f64> {
 
 /// How dates with slashes are read that do not begin with the year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum DateOrder {
+pub(crate) enum DateOrder {
     /// They are not.
     #[default]
     YearFirst,
@@ -100,7 +100,7 @@ pub enum DateOrder {
 
 /// As [`time_stamp`], also of dates with slashes in this order.
 #[must_use]
-pub fn time_stamp_in(text: &str, order: DateOrder) -> Option<f64> {
+pub(crate) fn time_stamp_in(text: &str, order: DateOrder) -> Option<f64> {
     let text = text.trim().as_bytes();
     let iso = |text| {
         let (year, rest) = number(text, 4)?;

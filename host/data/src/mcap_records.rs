@@ -107,7 +107,7 @@ impl<'a> Chunk<'a> {
 
     /// The same chunk with its records decompressed.
     #[must_use]
-    pub fn decompressed<'b>(&self, records: &'b [u8]) -> Chunk<'b> {
+    pub(crate) fn decompressed<'b>(&self, records: &'b [u8]) -> Chunk<'b> {
         Chunk { compression: "", records, crc: self.crc, uncompressed: self.uncompressed }
     }
 
@@ -184,7 +184,7 @@ impl<'a> Channel<'a> {
 
 /// How messages are arranged.
 #[derive(Debug, Clone, Copy)]
-pub struct Schema<'a> {
+pub(crate) struct Schema<'a> {
     /// Its number in the file.
     pub number: u16,
     /// The type of the messages, such as `sensor_msgs/msg/FluidPressure`.
@@ -198,7 +198,7 @@ pub struct Schema<'a> {
 impl<'a> Schema<'a> {
     /// `None` where the lengths in it contradict one another.
     #[must_use]
-    pub fn parse(body: &'a [u8]) -> Option<Self> {
+    pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut fields = Fields(body);
         let (number, name, encoding) = (fields.u16()?, fields.text()?, fields.text()?);
         let length = fields.u32()? as usize;
@@ -208,7 +208,7 @@ impl<'a> Schema<'a> {
 
 /// When a message was logged, ns since 1970.
 #[must_use]
-pub fn log_time(body: &[u8]) -> Option<u64> {
+pub(crate) fn log_time(body: &[u8]) -> Option<u64> {
     let mut fields = Fields(body);
     let (_channel, _sequence) = (fields.u16()?, fields.u32()?);
     fields.u64()
@@ -225,7 +225,7 @@ pub fn message(body: &[u8]) -> Option<(u16, u32, &[u8])> {
 
 /// Why a file cannot be read on.
 #[derive(Debug)]
-pub enum Trouble {
+pub(crate) enum Trouble {
     /// The system's reason.
     Io(io::Error),
     /// It does not begin with the magic.
@@ -238,7 +238,7 @@ pub enum Trouble {
 
 /// Reads one record after the other.
 #[derive(Debug)]
-pub struct Records<R> {
+pub(crate) struct Records<R> {
     reader: R,
     begun: bool,
     body: Vec<u8>,
@@ -246,7 +246,7 @@ pub struct Records<R> {
 
 impl<R: Read> Records<R> {
     /// From the first byte of a file on.
-    pub fn new(reader: R) -> Self {
+    pub(crate) fn new(reader: R) -> Self {
         Self { reader, begun: false, body: Vec::new() }
     }
 
@@ -254,7 +254,7 @@ impl<R: Read> Records<R> {
     ///
     /// # Errors
     /// [`Trouble`].
-    pub fn read(&mut self) -> Result<Option<(u8, &[u8])>, Trouble> {
+    pub(crate) fn read(&mut self) -> Result<Option<(u8, &[u8])>, Trouble> {
         if !self.begun {
             self.begun = true;
             let mut magic = [0; MAGIC.len()];

@@ -50,7 +50,7 @@ mod workbook;
 pub use campaign::{Campaign, Clock, largest_force, largest_force_of};
 pub use column_table::Column as TableColumn;
 pub use columns::{HELD, Recording};
-pub use follow::{Follower, UNKNOWN_PAUSE};
+pub use follow::Follower;
 pub use header::has_decimal_commas;
 pub use import::{Import, Missing};
 pub use mountings::{Preceding, Rest, SAME_LENGTH, VENTING};

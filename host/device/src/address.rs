@@ -24,14 +24,14 @@ use pam_data::error::{DataCode, Error, Result};
 pub enum Address {
     /// A serial device, such as `/dev/ttyACM0` or `COM3`.
     Serial(PathBuf),
-    /// `tcp:HOST:PORT`.
+    /// A TCP connection, written as `tcp:HOST:PORT`.
     Tcp {
         /// Name or address; an IPv6 address without its brackets.
         host: String,
-        /// Port.
+        /// Number of the TCP port.
         port: u16,
     },
-    /// `slcan:ADAPTER,address=N[,kbit=500][,baud=115200]`.
+    /// A device behind a CAN adapter, written as `slcan:ADAPTER,address=N[,kbit=500][,baud=115200]`.
     Can {
         /// Where the adapter is: a serial device, or TCP.
         adapter: Box<Address>,

@@ -22,7 +22,7 @@ use pam_data::error::{DataCode, Error, Result};
 pub enum Sensor {
     /// Pressure at the muscle.
     Pressure,
-    /// Stroke.
+    /// Stroke sensor.
     Stroke,
     /// Load cell.
     Force,
@@ -101,7 +101,7 @@ impl Sensor {
 pub struct Pair {
     /// Known value.
     pub value: f64,
-    /// Signal.
+    /// Mean signal of the sensor at this value, in the board's unit: volts on a board with converters.
     pub signal: f64,
 }
 

@@ -142,7 +142,7 @@ impl Client {
 
     /// Whether the device speaks this program's version of the link.
     #[must_use]
-    pub fn is_of_this_version(&self) -> bool {
+    pub(crate) fn is_of_this_version(&self) -> bool {
         self.hello.link_version == LINK_VERSION && self.hello.schema_hash == SCHEMA_HASH
     }
 
@@ -213,7 +213,7 @@ impl Client {
     ///
     /// # Errors
     /// [`DeviceCode::DeviceSilent`] when the line is gone.
-    pub fn telemetry_rate(&mut self, patience: Duration) -> Result<Option<u16>> {
+    pub(crate) fn telemetry_rate(&mut self, patience: Duration) -> Result<Option<u16>> {
         /// Gaps of which the least is the rate: lost samples make some of them longer.
         const GAPS: usize = 4;
         let deadline = Instant::now() + patience;

@@ -38,7 +38,7 @@ pub enum Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mishap {
-    /// Nothing.
+    /// Nothing goes wrong.
     None = 0,
     /// The load cell's wire breaks: its reading leaves its range.
     LoadCell = 1,
@@ -227,12 +227,6 @@ impl Emulated {
     #[must_use]
     pub fn address(&self) -> &Address {
         &self.address
-    }
-
-    /// Why it does not run in QEMU, where that was left open.
-    #[must_use]
-    pub fn why_native(&self) -> Option<&str> {
-        self.why_native.as_deref()
     }
 
     /// As text, for people.

@@ -5,8 +5,10 @@ use model_core::link::messages::{Mode, Side, StartedBy, State};
 mod faults;
 mod refusals;
 
-pub use faults::{FaultMessage, fault, quantity, report, stopped};
-pub use refusals::{in_use, refused};
+pub(crate) use faults::stopped;
+pub use faults::{FaultMessage, fault, report};
+pub use refusals::in_use;
+pub(crate) use refusals::refused;
 
 /// A state's name.
 #[must_use]

@@ -19,11 +19,11 @@ use pam_data::file_kind::FileKind;
 /// What is controlled, and the unit that people write it in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantity {
-    /// Newtons.
+    /// Force of the muscle, written in N.
     Force,
-    /// Kilopascals.
+    /// Gauge pressure, written in kPa.
     Pressure,
-    /// Millimetres.
+    /// Contraction stroke, written in mm.
     Stroke,
     /// Degrees, of a joint that two muscles move.
     Angle {

@@ -113,7 +113,7 @@ pub fn transmit(identifier: u16, data: &[u8]) -> String {
 
 /// The line that sets a bit rate.
 #[must_use]
-pub const fn bit_rate(kbit_per_s: u16) -> &'static str {
+pub(crate) const fn bit_rate(kbit_per_s: u16) -> &'static str {
     match kbit_per_s {
         125 => "S4\r",
         250 => "S5\r",

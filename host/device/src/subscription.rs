@@ -63,7 +63,7 @@ impl Subscription {
     }
 
     /// Notes that the stream is alive, for a sample that is of no use.
-    pub fn hears(&mut self) {
+    pub(crate) fn hears(&mut self) {
         self.last_message = Instant::now();
     }
 

@@ -43,7 +43,7 @@ fn invalid(cause: impl Into<String>) -> Error {
 ///
 /// # Errors
 /// Bytes that are not an ELF file, or an image whose vector table is in neither slot.
-pub fn program_of(elf: &[u8]) -> Result<(u8, Vec<u8>)> {
+pub(crate) fn program_of(elf: &[u8]) -> Result<(u8, Vec<u8>)> {
     let segments = placed(elf);
     if !elf.starts_with(b"\x7fELF\x01\x01") || segments.is_empty() {
         return Err(invalid("this is not an ELF file of a microcontroller"));
@@ -148,7 +148,7 @@ pub fn signed(
 /// The same for a program of the Nucleo.
 ///
 /// # Errors
-/// As [`program_of`].
+/// As `program_of`.
 pub fn signed_elf(elf: &[u8], release: (u16, u16, u16), key: &SigningKey) -> Result<Image> {
     let (slot, program) = program_of(elf)?;
     Ok(signed(Board::NucleoF446re, slot, NUCLEO_SLOTS[usize::from(slot)], release, &program, key))

@@ -48,7 +48,7 @@ impl Kind {
 /// A fitted baseline, with effects that were fitted beside it.
 #[derive(Clone, Debug)]
 pub(crate) struct Baseline {
-    /// Which.
+    /// Which baseline was fitted.
     pub kind: Kind,
     /// What the baseline and the effects beside it express.
     pub span: Absorbable,

@@ -10,7 +10,7 @@
 //! | `memory` | the relaxing states, stepped exactly |
 //! | `spline`, `shift_fit` | free curves on a shifted pressure |
 //! | `law` | threshold of each mounting, relaxed share, stress-free pressure, unrecorded times |
-//! | [`table_fit`] | the memory as an effect of a table |
+//! | `table_fit` | the memory as an effect of a table |
 //! | [`table_unseen`] | each run predicted from the others by tables |
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
@@ -46,14 +46,15 @@ mod shift_fit;
 mod slack_reading;
 mod spline;
 mod staircase;
-pub mod table_fit;
+pub(crate) mod table_fit;
 pub mod table_unseen;
 #[cfg(test)]
 mod tests;
 mod unseen;
 
 pub use answer::History;
-pub use enter::{diagnose, reliable_recordings};
+pub use enter::diagnose;
+pub(crate) use enter::reliable_recordings;
 pub use entries::is_from_history;
 
 use model_core::braid::Geometry;

@@ -29,7 +29,7 @@
 //! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
 //! | over campaigns | [`mod@reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
 //! | over muscles | [`mod@stock`] | what muscles of one stock share, and what each has of its own |
-//! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`why_not`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
+//! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`verdict::WhyNot`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
 //! | | [`refitted_table`] | the table refitted beside the selected effects |
 //! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |
 //!
@@ -84,7 +84,7 @@ pub mod timeline;
 mod valve_pulses;
 pub mod verdict;
 pub mod why;
-pub mod why_not;
+mod why_not;
 
 pub use description::diagnose_described;
 pub use diagnosis::diagnose;

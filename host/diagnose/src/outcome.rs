@@ -31,7 +31,7 @@ pub enum Outcome {
 /// The pattern of what no named effect explains.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pattern {
-    /// None.
+    /// No pattern is recognised.
     None,
     /// Periodic in time, with this frequency in Hz.
     Periodic(f64),

@@ -41,7 +41,7 @@ pub fn parse(text: &str) -> Result<Protocol> {
 ///
 /// # Errors
 /// [`DataCode::ProtocolInvalid`] for one that takes too long, or that records nothing.
-pub fn play(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Campaign> {
+pub(crate) fn play(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Campaign> {
     let dt = 1.0 / protocol.sample_hz.min(PROTOCOL_RATE);
     let mut player = Player {
         muscle,

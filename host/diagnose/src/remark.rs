@@ -134,7 +134,7 @@ pub enum Remark {
     },
     /// Readings at the end of the force sensor's range, excluded.
     SensorEnd {
-        /// Rows.
+        /// Number of such readings.
         rows: usize,
         /// The reading, N.
         force: f64,
@@ -192,7 +192,7 @@ pub enum Remark {
     Refused {
         /// Its name.
         effect: String,
-        /// Why.
+        /// Why it is not kept.
         why: Refusal,
     },
     /// What a check of the bench measured.

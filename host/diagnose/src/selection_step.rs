@@ -54,7 +54,7 @@ pub(crate) struct Selection {
     pub traces: Vec<Vec<f64>>,
     /// The noise at the end.
     pub noise: Noise,
-    /// Remarks.
+    /// Remarks of the selection on its data and its effects.
     pub remarks: Vec<Remark>,
 }
 

@@ -75,7 +75,7 @@ pub struct MuscleOwn {
 /// The shared force at a contraction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SharedPlace {
-    /// `ΔL/L0`.
+    /// Contraction `ΔL/L0`, a fraction; 0 at rest length.
     pub contraction: f64,
     /// Mid-line of the force at the highest pressure, N.
     pub force: f64,

@@ -12,7 +12,7 @@ use pam_data::recording::Recording;
 /// Periodic pulses of a recording's pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ValvePulses {
-    /// s.
+    /// Time from the beginning of a pulse to that of the next, s.
     pub period: f64,
     /// When the first pulse begins, after the first reading, s.
     pub phase: f64,

@@ -63,7 +63,7 @@ impl ParameterValue {
 
     /// Whether a value lies outside what the literature knows; one that is not used does not.
     #[must_use]
-    pub fn is_outside(value: f64, parameter: &Parameter) -> bool {
+    pub(crate) fn is_outside(value: f64, parameter: &Parameter) -> bool {
         let (low, high) = (parameter.low, parameter.high);
         let too_small = value.abs() < low.abs().min(high.abs()) && low * high > 0.0;
         value != 0.0 && (value.abs() > parameter.largest() || too_small)
@@ -154,7 +154,7 @@ pub struct HeldOut {
     pub noise_N: f64,
     /// The same two with the samples about each turn left in.
     pub with_turns_before_N: f64,
-    /// After.
+    /// Error with the effects, likewise, N.
     pub with_turns_after_N: f64,
 }
 
@@ -236,7 +236,7 @@ pub struct Profile {
 /// A residual over time, thinned for drawing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trace {
-    /// s.
+    /// Time of each sample, s.
     pub time: Vec<f64>,
     /// Before, N.
     pub before: Vec<f64>,

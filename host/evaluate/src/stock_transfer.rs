@@ -7,7 +7,7 @@
 use pam_data::error::{Error, Result};
 use pam_data::recording::motion::Motion;
 use pam_fit::error::FitCode;
-use pam_fit::stock::criteria::MEAN_SIZE;
+use pam_fit::stock::MEAN_SIZE;
 use pam_fit::stock::{Law, Member, Place, StockCells, StockFit, fit, stock_cells};
 use rayon::prelude::*;
 

@@ -57,7 +57,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All.
+    /// Every check of the bench.
     pub const ALL: [Self; 5] =
         [Self::DeadWeights, Self::RigidBar, Self::ReferenceGauge, Self::Weighing, Self::ClosedValve];
 

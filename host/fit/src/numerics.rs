@@ -8,7 +8,6 @@
 //! | [`jackknife`] | variances from estimates with one block left out in turn |
 //! | [`covariance_root`] | a covariance as the product of a matrix with its transpose |
 //! | [`spline_basis`] | natural cubic splines that are 1 at one node and 0 at the others |
-//! | [`finite_difference`] | central differences |
 //! | [`bspline`] | cubic B-splines on even knots |
 //!
 //! Medians, quantiles and the normal distribution's constants are in [`pam_data::statistics`]. statrs provides the distributions, nalgebra QR, SVD, eigenvectors and the Cholesky factorisation of small full-rank systems. [`symmetric`] is a
@@ -32,7 +31,6 @@
 
 pub mod bspline;
 pub mod covariance_root;
-pub mod finite_difference;
 pub mod jackknife;
 pub mod least_squares;
 pub mod spline_basis;

@@ -17,7 +17,7 @@
 //! | Gauss–Newton steps, and the variances of the random effects | `mixed_model` |
 //! | each muscle predicted from the others; intervals over muscles | `between` |
 //! | each held mounting predicted from all others, and what it has of its own | `unseen_mountings` |
-//! | constants | [`criteria`] |
+//! | constants | `criteria` |
 //!
 //! Linear mixed model and its equations: C. R. Henderson, Biometrics 31 (1975) 423, doi 10.2307/2529430; variances by expectation and maximisation:
 //! N. M. Laird, J. H. Ware, Biometrics 38 (1982) 963, doi 10.2307/2529876.
@@ -26,7 +26,7 @@ use self::criteria::SLOPE_STEP;
 
 mod between;
 mod cells;
-pub mod criteria;
+mod criteria;
 mod mixed_model;
 mod surface;
 #[cfg(test)]
@@ -35,6 +35,7 @@ mod unseen_mountings;
 
 pub use between::{LawError, Stock, stock};
 pub use cells::{Cell, Mounted, StockCells, stock_cells};
+pub use criteria::{FEWEST_MUSCLES, MEAN_SIZE};
 pub use mixed_model::fit;
 pub use unseen_mountings::{MountingCause, UnseenMounting, unseen_mountings};
 

@@ -17,7 +17,7 @@ const NEAR_ZERO: f64 = 0.01;
 const CREEP: f64 = 0.03;
 /// A mean error above this, percent of blocked force, is not a description of the recordings: a wrong unit, sign or dimension is more likely
 /// than physics that the model lacks.
-pub const WORST_MEAN_ERROR: f64 = 10.0;
+pub(crate) const WORST_MEAN_ERROR: f64 = 10.0;
 /// A force that rises by this share over the tested contraction is none that friction, creep, or a mounting error of a millimetre feigns.
 const RISE: f64 = 0.1;
 /// The inverse may fail at this share of the tested places (pressure and contraction) at most: the corners of the range.

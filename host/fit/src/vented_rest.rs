@@ -29,12 +29,12 @@ const VENTED_BEFORE: f64 = 30.0;
 
 /// Whether an effect of a table requires the time before recordings.
 #[must_use]
-pub fn matters(effects: &[FittedEffect]) -> bool {
+pub(crate) fn matters(effects: &[FittedEffect]) -> bool {
     effects.iter().any(|e| e.effect == EffectName::BladderCreep)
 }
 
 /// The moments before a recording whose motions are given. The first of these then follows the rest, not the recording before.
-pub fn contexts(
+pub(crate) fn contexts(
     muscle: &Muscle<f64>,
     motions: &mut [Motion<f64>],
     rest: &Rest,

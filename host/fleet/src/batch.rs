@@ -31,7 +31,7 @@ pub enum Task {
     Fit,
     /// The diagnosis only.
     Diagnose,
-    /// Both.
+    /// The table and the diagnosis.
     Both,
 }
 

@@ -153,7 +153,7 @@ impl Columns {
     ///
     /// # Errors
     /// None in practice: all columns have the same length.
-    pub fn to_parquet(&self, about: &[(&str, &str)]) -> Result<Vec<u8>> {
+    pub(crate) fn to_parquet(&self, about: &[(&str, &str)]) -> Result<Vec<u8>> {
         let fields =
             self.0.iter().map(|(n, v)| v.schema(n).map(Arc::new)).collect::<Result<Vec<TypePtr>>>()?;
         let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?);

@@ -11,7 +11,7 @@ use pam_data::statistics::median;
 use crate::fleet::{Fleet, Member};
 
 /// Corrected p values below this one count as a difference.
-pub const SIGNIFICANT: f64 = 0.01;
+pub(crate) const SIGNIFICANT: f64 = 0.01;
 /// Fewer muscles with a tag are not compared with the others.
 const SMALLEST_GROUP: usize = 4;
 /// The tag that holds a date.
@@ -64,7 +64,7 @@ pub struct Finding {
 
 /// All differences that are larger than chance explains, the clearest first, and how many tests were made.
 #[must_use]
-pub fn differences(fleet: &Fleet) -> (Vec<Finding>, usize) {
+pub(crate) fn differences(fleet: &Fleet) -> (Vec<Finding>, usize) {
     let mut all = Vec::new();
     for (key, value, inside) in groups(fleet) {
         let outside: Vec<&Member> =
@@ -176,7 +176,7 @@ fn trends(fleet: &Fleet) -> Vec<Finding> {
 
 /// Days since 1 March of year 0 of a date such as 2026-03-31, in the proleptic Gregorian calendar; a time behind it is ignored.
 #[must_use]
-pub fn day(date: &str) -> Option<f64> {
+pub(crate) fn day(date: &str) -> Option<f64> {
     let mut parts = date.get(..10)?.splitn(3, '-');
     let year: i64 = parts.next()?.parse().ok()?;
     let month: i64 = parts.next()?.parse().ok().filter(|m| (1..=12).contains(m))?;

@@ -2,8 +2,8 @@
 //!
 //! | what | where |
 //! | --- | --- |
-//! | the manifest: one row per muscle | [`manifest`], [`work_item`] |
-//! | every muscle computed once, in parallel | [`batch`], [`shard`] |
+//! | the manifest: one row per muscle | `manifest`, `work_item` |
+//! | every muscle computed once, in parallel | [`batch`], [`Shard`] |
 //! | results: four Parquet tables per muscle, whole or not at all | [`columns`], [`partition`], [`failures`] |
 //! | all results as one fleet: outlying muscles, groups that differ, a page | [`fleet`], [`robust`], [`groups`], [`overview`], [`page`] |
 //! | the same with manifests, recordings and results in buckets | `storage`, `objects` |
@@ -17,18 +17,18 @@ pub mod error;
 pub mod failures;
 pub mod fleet;
 pub mod groups;
-pub mod manifest;
 pub mod overview;
 pub mod page;
 pub mod partition;
 pub mod robust;
-pub mod shard;
 pub mod stock;
-pub mod work_item;
 
 mod analysis;
+mod manifest;
 mod objects;
 mod results;
+mod shard;
 mod storage;
+mod work_item;
 
 pub use shard::Shard;

@@ -40,7 +40,7 @@ pub(crate) type Row = Vec<(String, Vec<String>)>;
 
 /// A row that is a muscle's, or an error with a name for it.
 #[derive(Debug)]
-pub enum Entry {
+pub(crate) enum Entry {
     /// A muscle to compute.
     Muscle(Box<WorkItem>),
     /// A row that names no computable muscle; listed as a failure under `label`.
@@ -64,7 +64,7 @@ impl Entry {
 }
 
 /// The rows of a manifest file.
-pub struct Manifest {
+pub(crate) struct Manifest {
     path: PathBuf,
     folder: PathBuf,
     rows: Box<dyn Iterator<Item = (u64, Result<Row>)> + Send>,

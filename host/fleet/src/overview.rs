@@ -41,7 +41,7 @@ pub struct Effect {
     pub effect: String,
     /// Whether it is the bench's.
     pub bench: bool,
-    /// Muscles.
+    /// Number of muscles with this effect.
     pub muscles: usize,
     /// Share of the diagnosed muscles.
     pub share: f64,
@@ -105,7 +105,7 @@ impl Overview {
 
     /// How many muscles are outlying in at least one quantity.
     #[must_use]
-    pub fn outlying_muscles(&self) -> usize {
+    pub(crate) fn outlying_muscles(&self) -> usize {
         let mut members: Vec<usize> = self.outlying.iter().map(|o| o.member).collect();
         members.sort_unstable();
         members.dedup();

@@ -71,7 +71,7 @@ pub fn muscle_name(folder: &str) -> Option<String> {
 ///
 /// # Errors
 /// An output that cannot be read.
-pub fn muscles(output: &Path) -> Result<Vec<(String, PathBuf)>> {
+pub(crate) fn muscles(output: &Path) -> Result<Vec<(String, PathBuf)>> {
     local_only(output)?;
     let entries = fs::read_dir(output).map_err(|e| Error::unreadable(output, &e))?;
     let mut found = Vec::new();
@@ -122,7 +122,7 @@ impl Output {
 
     /// Whether the stored results of a muscle list a failure.
     #[must_use]
-    pub fn has_failures(&self, muscle: &str) -> bool {
+    pub(crate) fn has_failures(&self, muscle: &str) -> bool {
         match self {
             Self::Folder(folder) => folder.has_failures(muscle),
             Self::Bucket(bucket) => bucket.0.has_failures(muscle),
@@ -182,7 +182,7 @@ impl Folder {
 
     /// Whether the stored results of a muscle list a failure.
     #[must_use]
-    pub fn has_failures(&self, muscle: &str) -> bool {
+    pub(crate) fn has_failures(&self, muscle: &str) -> bool {
         File::open(self.root.join(folder_name(muscle)).join("failures.parquet")).is_ok_and(|f| rows(f) > 0)
     }
 

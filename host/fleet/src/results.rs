@@ -18,7 +18,7 @@ const ORDERS: usize = 6;
 
 /// What every row of every table says about where it comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Provenance {
+pub(crate) struct Provenance {
     /// The muscle.
     pub muscle: String,
     /// The key of inputs and settings; rows with the same key are the same.

@@ -12,7 +12,7 @@ use pam_data::statistics::{deviation_from_median, median};
 /// Probability that a fleet of normally distributed values contains any muscle that counts as outlying, over all quantities.
 pub const FALSE_ALARMS: f64 = 0.05;
 /// Fleets below this size have no outlying muscles: half of so few values could be anywhere.
-pub const SMALLEST: usize = 8;
+pub(crate) const SMALLEST: usize = 8;
 /// Simulated fleets: enough for the quantile at `FALSE_ALARMS` divided by the number of quantities.
 const SIMULATED: usize = 4000;
 /// Simulated values, at most; the quantile is that of fewer fleets then.
@@ -80,7 +80,7 @@ impl Normal {
 
 /// The size of z beyond which a muscle counts as outlying in one of `quantities`, in a fleet of `muscles`.
 #[must_use]
-pub fn threshold(muscles: usize, quantities: usize) -> f64 {
+pub(crate) fn threshold(muscles: usize, quantities: usize) -> f64 {
     let muscles = muscles.max(SMALLEST);
     let fleets = (MOST_VALUES / muscles).clamp(400, SIMULATED);
     let mut normal = Normal { state: 0x70616d, spare: None };

@@ -24,7 +24,7 @@ use pam_fit::table_file::{TableFile, Uncertainty};
 use pam_fit::{Columns, Fit, Options, PointUse, columns, fit};
 
 /// Fewer kin do not determine a covariance: the factor `(n − 1)/(n − 3)` of Student's distribution has a meaning from 4 on, and is 2 at 5.
-pub const FEWEST: usize = 5;
+pub(crate) const FEWEST: usize = 5;
 /// Nodes of the table over the kin's pressures.
 const NODES: usize = 8;
 /// Steps of the iteration; the force is linear in all but the product of `k_F` with the others.

@@ -17,7 +17,7 @@ const MOST_FILES: usize = 10_000;
 
 /// One muscle as its row in the manifest describes it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WorkItem {
+pub(crate) struct WorkItem {
     /// The name under which its results are stored.
     pub muscle: String,
     /// The folder that paths are relative to.
@@ -39,7 +39,7 @@ pub struct WorkItem {
 /// What a file is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Role {
+pub(crate) enum Role {
     /// The muscle's description.
     Description,
     /// An import description.
@@ -52,7 +52,7 @@ pub enum Role {
 
 /// A file with its content's hash.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Input {
+pub(crate) struct Input {
     /// What it is for.
     pub role: Role,
     /// The path as results name it: relative to the manifest's folder.
@@ -73,7 +73,7 @@ struct InputRecord<'a> {
 
 /// The input files of one muscle, hashed, and the first that cannot be read.
 #[derive(Debug)]
-pub struct Inputs {
+pub(crate) struct Inputs {
     /// All files, in the order of the manifest.
     pub list: Vec<Input>,
     /// Why a file cannot be used.

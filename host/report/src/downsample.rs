@@ -60,7 +60,7 @@ pub fn extremes(x: &[f64], y: &[f64], columns: usize) -> Vec<usize> {
 /// largest triangle they span with their neighbours (S. Steinarsson, *Downsampling time series for visual
 /// representation*, University of Iceland, 2013). `x` and `y` are in pixels.
 #[must_use]
-pub fn triangles(x: &[f64], y: &[f64], target: usize) -> Vec<usize> {
+pub(crate) fn triangles(x: &[f64], y: &[f64], target: usize) -> Vec<usize> {
     let n = x.len().min(y.len());
     if n <= target.max(3) {
         return (0..n).collect();
@@ -106,7 +106,7 @@ pub fn triangles(x: &[f64], y: &[f64], target: usize) -> Vec<usize> {
 /// Rows to draw of a cloud of points: one for each cell of `cell` pixels, and coarser cells until at most `target`
 /// remain. `x` and `y` are in pixels.
 #[must_use]
-pub fn cells(x: &[f64], y: &[f64], cell: f64, target: usize) -> Vec<usize> {
+pub(crate) fn cells(x: &[f64], y: &[f64], cell: f64, target: usize) -> Vec<usize> {
     let n = x.len().min(y.len());
     let mut size = cell.max(1e-3);
     loop {
@@ -125,7 +125,7 @@ pub fn cells(x: &[f64], y: &[f64], cell: f64, target: usize) -> Vec<usize> {
 /// The points of a line that are needed so that none is farther than `tolerance` from it (D. H. Douglas and T. K. Peucker,
 /// Cartographica 10 (1973) 112, doi:10.3138/FM57-6770-U75U-7727). All must be finite.
 #[must_use]
-pub fn needed(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
+pub(crate) fn needed(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     let n = points.len();
     if n < 3 {
         return points.to_vec();

@@ -44,7 +44,7 @@ pub fn catalogue() -> Result<Vec<(Trace, super::Figure)>, TableError> {
 
 /// The three traces that look most like this one, with their likeness.
 #[must_use]
-pub fn lookalikes<'a>(trace: &Trace, all: &'a [(Trace, super::Figure)]) -> Vec<(&'a Trace, f64)> {
+pub(crate) fn lookalikes<'a>(trace: &Trace, all: &'a [(Trace, super::Figure)]) -> Vec<(&'a Trace, f64)> {
     let mut others: Vec<(&Trace, f64)> = all
         .iter()
         .map(|(other, _)| other)

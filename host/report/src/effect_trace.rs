@@ -13,13 +13,13 @@ use super::{Axis, Colour, Figure, Panel};
 use pam_fit::bench::{Candidate, Span};
 
 /// Share of the blocked force that every effect is drawn at; larger than most are, so that it can be seen.
-pub const DRAWN_AT: f64 = 0.1;
+pub(crate) const DRAWN_AT: f64 = 0.1;
 const STEP: f64 = 0.02;
 const LOOPS_PRESSURE: f64 = 345e3;
 
 /// The demonstration: every moment, and the model's force at it.
 #[derive(Debug, Clone)]
-pub struct Demonstration {
+pub(crate) struct Demonstration {
     /// Every moment, in order.
     pub contexts: Vec<Context<f64>>,
     /// Force of the base model, N.
@@ -34,7 +34,7 @@ pub struct Demonstration {
 /// One effect on the demonstration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
-    /// Which.
+    /// The effect.
     pub candidate: Candidate,
     /// Its parameters in SI units: shapes in the middle of their plausible range, amplitudes as large as drawn.
     pub parameters: Vec<f64>,
@@ -169,7 +169,7 @@ impl Demonstration {
 /// Similarity of the residuals of two traces after a fit: the size of the cosine of the angle between them, 1 where one is a multiple
 /// of the other.
 #[must_use]
-pub fn likeness(a: &Trace, b: &Trace) -> f64 {
+pub(crate) fn likeness(a: &Trace, b: &Trace) -> f64 {
     let size = (dot(&a.left, &a.left) * dot(&b.left, &b.left)).sqrt();
     if size > 0.0 { dot(&a.left, &b.left).abs() / size } else { 0.0 }
 }

@@ -30,7 +30,7 @@ pub enum Style {
 pub enum Mark {
     /// Points in order.
     Series {
-        /// Abscissae.
+        /// Abscissae, in the unit of the horizontal axis.
         x: Vec<f64>,
         /// Ordinates; a value that is not finite breaks a line.
         y: Vec<f64>,
@@ -39,7 +39,7 @@ pub enum Mark {
     },
     /// The area between two curves over one abscissa: an interval.
     Band {
-        /// Abscissae.
+        /// Abscissae, in the unit of the horizontal axis.
         x: Vec<f64>,
         /// Lower curve.
         low: Vec<f64>,
@@ -48,7 +48,7 @@ pub enum Mark {
     },
     /// A vertical bar with ends at each point: an interval of one number.
     Intervals {
-        /// Abscissae.
+        /// Abscissae, in the unit of the horizontal axis.
         x: Vec<f64>,
         /// Lower ends.
         low: Vec<f64>,

@@ -63,7 +63,7 @@ fn parts(text: &str) -> Vec<(Kind, &str)> {
 /// The text with the characters that XML gives a meaning to made harmless; control characters, which XML forbids, are
 /// shown as their pictures.
 #[must_use]
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 8);
     for c in text.chars() {
         match c {
@@ -120,7 +120,7 @@ pub fn html(text: &str) -> Markup {
 
 /// As the content of an SVG text element.
 #[must_use]
-pub fn svg(text: &str) -> String {
+pub(crate) fn svg(text: &str) -> String {
     let mut out = String::new();
     for (kind, inner) in parts(text) {
         let inner = escape(inner);
@@ -161,7 +161,7 @@ pub fn plain(text: &str) -> String {
 
 /// As Markdown, for forges and mails.
 #[must_use]
-pub fn markdown(text: &str) -> String {
+pub(crate) fn markdown(text: &str) -> String {
     let mut out = String::new();
     for (kind, inner) in parts(text) {
         match kind {
@@ -184,7 +184,7 @@ pub fn markdown(text: &str) -> String {
 
 /// How wide a text is at a font size of one, in a common sans-serif face. An estimate to leave room by, on the wide side.
 #[must_use]
-pub fn width(text: &str) -> f64 {
+pub(crate) fn width(text: &str) -> f64 {
     parts(text)
         .into_iter()
         .map(|(kind, inner)| {

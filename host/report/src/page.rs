@@ -13,7 +13,7 @@ pub enum Tone {
     Good,
     /// To be checked.
     Caution,
-    /// Wrong.
+    /// Not as required.
     Bad,
 }
 
@@ -83,7 +83,7 @@ pub enum Block {
     Text(String),
     /// A paragraph that stands out.
     Notice(Tone, String),
-    /// Points.
+    /// A list with one bullet for each text.
     List(Vec<String>),
     /// A picture.
     Figure(Box<Figure>),
@@ -183,7 +183,7 @@ pub struct Page {
     pub verdict: Option<(Tone, String)>,
     /// The numbers that matter.
     pub facts: Vec<Fact>,
-    /// Chapters.
+    /// Its chapters, in order.
     pub sections: Vec<Section>,
     /// Where it comes from: files, versions, hashes.
     pub origin: Vec<(String, String)>,

@@ -8,21 +8,24 @@ pub(crate) mod history;
 mod outcome;
 mod region;
 mod remark;
-pub mod separate;
+pub(crate) mod separate;
 mod summary;
 pub mod timeline;
 mod value;
 mod why;
 mod why_not;
 
-pub use experiment::{measure, proposal};
+pub(crate) use experiment::measure;
+pub use experiment::proposal;
 pub(crate) use hidden::{HiddenEffect, hidden};
-pub use outcome::{one_bladder_misfits, pattern, split, verdict};
-pub use region::region;
-pub use remark::{remark, reserve};
-pub use summary::{summary, traded_off, unexplained_base};
-pub use value::with_interval;
-pub use why::why;
+pub(crate) use outcome::{one_bladder_misfits, split};
+pub use outcome::{pattern, verdict};
+pub(crate) use region::region;
+pub use remark::remark;
+pub use summary::summary;
+pub(crate) use summary::{traded_off, unexplained_base};
+pub(crate) use value::with_interval;
+pub(crate) use why::why;
 pub use why_not::why_not;
 
 /// `a`, `a and b`, `a, b and c`.

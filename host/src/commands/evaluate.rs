@@ -22,8 +22,8 @@ use pam_evaluate::published::Published;
 use pam_evaluate::stock_transfer::{StockTransfer, predict_with_stock};
 use pam_fit::Fit;
 use pam_fit::Options;
+use pam_fit::stock::FEWEST_MUSCLES;
 use pam_fit::stock::Member;
-use pam_fit::stock::criteria::FEWEST_MUSCLES;
 
 use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Reader};

@@ -78,7 +78,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// Both.
+    /// Both setpoint profiles.
     pub const ALL: [Self; 2] = [Self::Sine, Self::Steps];
 
     /// The name for people and files.

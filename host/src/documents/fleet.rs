@@ -23,7 +23,7 @@ pub(crate) struct MuscleFailure<'a> {
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Batch<'a> {
-    /// `pam-batch/1`.
+    /// Name and version of this schema: `pam-batch/1`.
     pub schema: &'static str,
     pub tool: &'a str,
     pub manifest: String,
@@ -102,7 +102,7 @@ pub(crate) struct GroupDifference<'a> {
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Fleet<'a> {
-    /// `pam-fleet/1`.
+    /// Name and version of this schema: `pam-fleet/1`.
     pub schema: &'static str,
     pub muscles: usize,
     pub fitted: usize,
@@ -130,7 +130,7 @@ pub(crate) struct Fleet<'a> {
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Stock<'a> {
-    /// `pam-stock/1`.
+    /// Name and version of this schema: `pam-stock/1`.
     pub schema: &'static str,
     pub muscle: &'a str,
     /// Muscles of the stock that were used.

@@ -131,7 +131,7 @@ pub(crate) mod schema {
     #[derive(JsonSchema)]
     struct About {
         schema: String,
-        /// UTC.
+        /// When the recording began, ISO 8601 in UTC.
         date: String,
         /// Release of the host program.
         host: String,

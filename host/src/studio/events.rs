@@ -27,7 +27,7 @@ pub(super) enum Message<'a> {
         #[serde(flatten)]
         controller: Option<Controller>,
     },
-    /// Samples.
+    /// Samples of the controller, column by column.
     #[serde(rename = "t")]
     Telemetry(Columns),
 }

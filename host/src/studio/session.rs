@@ -32,7 +32,7 @@ pub enum Order {
     IsConnected(Address),
     /// Vent what the page has started, and close the connection.
     Disconnect,
-    /// Arm.
+    /// Arm the controller, so that it accepts a start.
     Arm,
     /// Follow a setpoint profile.
     Follow(Quantity, SetpointProfile),

@@ -67,7 +67,7 @@ impl Vent {
 /// Where the page finds the path.
 #[derive(Debug, Clone)]
 pub struct VentPath {
-    /// `http://127.0.0.1:PORT`.
+    /// Origin of its address: `http://127.0.0.1:PORT`.
     pub origin: String,
     /// The token, which only vents.
     pub token: Arc<str>,

@@ -18,7 +18,7 @@ pub struct BenchSpec {
     /// Frame, joints and moving mass.
     #[serde(default)]
     pub rig: Rig,
-    /// Instruments.
+    /// Sensors of pressure, stroke, and force, with their errors.
     pub instruments: Instruments,
     /// Seed of all noise.
     pub seed: u64,
@@ -60,7 +60,6 @@ pub struct Bench {
     crosshead: f64,
     rounded: f64,
     cycle: u32,
-    force: f64,
     temperature: f64,
     files: Vec<Recording>,
     open: bool,
@@ -98,7 +97,6 @@ impl Bench {
             crosshead: 0.0,
             rounded: 0.0,
             cycle: 0,
-            force: 0.0,
             temperature: 22.0,
             files: Vec::new(),
             open: false,
@@ -113,11 +111,6 @@ impl Bench {
     /// Seconds since the bench was switched on.
     pub fn clock(&self) -> f64 {
         self.clock
-    }
-
-    /// The force without instruments at the last step, N.
-    pub fn true_force(&self) -> f64 {
-        self.force
     }
 
     /// Carry out a protocol and give its files. The muscle keeps what happened to it: a second protocol continues from there.
@@ -245,7 +238,6 @@ impl Bench {
         let stroke = self.rig.stroke(self.crosshead, |x| muscle.force_after(dt, x, before, ambient));
         let pressure = self.air.advance(dt, self.command, self.muscle.volume(stroke));
         let drive = self.muscle.advance(dt, stroke, pressure, self.ambient);
-        self.force = drive.force;
         self.temperature = drive.temperature;
         let at_cell = self.rig.at_cell(drive.force, pressure, stroke, dt);
         self.channels[0].follow(dt, self.air.seen());

@@ -135,7 +135,7 @@ pub fn enriched(muscle: &Muscle, levels: &[f64], seed: u64) -> Protocol {
 
 /// Protocol C: B with a tare after every level, half an hour of vented rest, and the first level once more. Its checks of the
 /// bench are in [`crate::checks`].
-pub fn complete(muscle: &Muscle, levels: &[f64], seed: u64) -> Protocol {
+pub(crate) fn complete(muscle: &Muscle, levels: &[f64], seed: u64) -> Protocol {
     let (v, mut n) = (slow(muscle, levels), 0);
     let top = levels.iter().copied().fold(0.0, f64::max);
     let order = shuffled(levels, seed);

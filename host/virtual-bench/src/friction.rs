@@ -51,7 +51,7 @@ impl BraidFriction {
 
 /// State of the bristles.
 #[derive(Debug, Clone)]
-pub struct Braid {
+pub(crate) struct Braid {
     z: Vec<f64>,
     /// Pressure since the strands last moved, Pa, within ±h.
     carried: f64,

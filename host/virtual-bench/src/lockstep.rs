@@ -51,13 +51,13 @@
 use std::io::{self, Read, Write};
 
 /// Size of a request in bytes.
-pub const REQUEST_LEN: usize = 18;
+pub(crate) const REQUEST_LEN: usize = 18;
 /// Size of an answer in bytes.
-pub const ANSWER_LEN: usize = 22;
+pub(crate) const ANSWER_LEN: usize = 22;
 /// First byte of a request.
-pub const REQUEST_SYNC: u8 = 0xA5;
+pub(crate) const REQUEST_SYNC: u8 = 0xA5;
 /// First byte of an answer.
-pub const ANSWER_SYNC: u8 = 0x5A;
+pub(crate) const ANSWER_SYNC: u8 = 0x5A;
 
 /// What the board sends to the bench in each control tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

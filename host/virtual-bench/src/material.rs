@@ -40,7 +40,7 @@ pub enum Hyperelastic {
 
 impl Hyperelastic {
     /// Treloar's vulcanised natural rubber in Ogden's constants (1972).
-    pub const TRELOAR: Self = Self::Ogden { mu: [0.618e6, 1.18e3, -9.81e3], alpha: [1.3, 5.0, -2.0] };
+    pub(crate) const TRELOAR: Self = Self::Ogden { mu: [0.618e6, 1.18e3, -9.81e3], alpha: [1.3, 5.0, -2.0] };
 
     /// Energy density, J/m³, at principal stretches `l`.
     pub fn energy(&self, l: [f64; 3]) -> f64 {
@@ -79,7 +79,7 @@ impl Hyperelastic {
     }
 
     /// Young's modulus at small strain, Pa.
-    pub fn young(&self) -> f64 {
+    pub(crate) fn young(&self) -> f64 {
         match *self {
             Self::MooneyRivlin { c10, c01 } => 6.0 * (c10 + c01),
             Self::Yeoh { c10, .. } => 6.0 * c10,
@@ -100,7 +100,7 @@ impl Hyperelastic {
 }
 
 /// I1 and I2 of principal stretches.
-pub fn invariants(l: [f64; 3]) -> (f64, f64) {
+pub(crate) fn invariants(l: [f64; 3]) -> (f64, f64) {
     let s = l.map(|x| x * x);
     (s[0] + s[1] + s[2], s[0] * s[1] + s[1] * s[2] + s[2] * s[0])
 }

@@ -177,7 +177,7 @@ pub struct TruthAt {
 }
 
 /// Push at which a slack muscle buckles, part of the blocked force at the rated pressure.
-pub const BUCKLING: f64 = 0.001;
+pub(crate) const BUCKLING: f64 = 0.001;
 
 /// A muscle at work: tables built once, and its state. Clones share the tables.
 #[derive(Debug, Clone)]
@@ -250,7 +250,7 @@ impl Muscle {
     ///
     /// Below contact the bladder stands alone and pushes its ends apart in proportion to the pressure; at contact the two
     /// descriptions agree. A muscle that pushes buckles: it goes slack at a push of [`BUCKLING`] of its blocked force.
-    pub fn quasi_parts(&self, p: f64, stroke: f64) -> (f64, f64) {
+    pub(crate) fn quasi_parts(&self, p: f64, stroke: f64) -> (f64, f64) {
         let (pressure, elastic) = self.straight_parts(p, stroke);
         let force = pressure + elastic;
         if force >= 0.0 || self.buckling <= 0.0 {
@@ -320,7 +320,7 @@ impl Muscle {
     }
 
     /// The force (N) after a step of `dt` (s) to a contraction stroke (m) and pressure (Pa) that is not made.
-    pub fn force_after(&self, dt: f64, stroke: f64, p: f64, ambient: f64) -> f64 {
+    pub(crate) fn force_after(&self, dt: f64, stroke: f64, p: f64, ambient: f64) -> f64 {
         self.clone().advance(dt, stroke, p, ambient).force
     }
 

@@ -1,9 +1,12 @@
 //! Physics beyond the quasi-static muscle, each of which can be switched on apart: [`Physics`] names what is on,
-//! [`PhysicsState`] carries the memory.
+//! `PhysicsState` carries the memory.
 
-pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Temperatures, Wear};
-pub use crate::rubbing::{Activated, Ageing, Relays, RubbingState, Seal, Slow, StrandContact, Viscous};
-pub use crate::wall_creep::{LoadHistory, WallCreep};
+use crate::rubber::Temperatures;
+pub use crate::rubber::{Branches, Heat, Mullins, Relaxation, Wear};
+use crate::rubbing::RubbingState;
+pub use crate::rubbing::{Activated, Ageing, Relays, Seal, Slow, StrandContact, Viscous};
+use crate::wall_creep::LoadHistory;
+pub use crate::wall_creep::WallCreep;
 use serde::{Deserialize, Serialize};
 
 /// What is switched on; everything off is the quasi-static muscle with bristle friction.
@@ -46,7 +49,7 @@ pub struct Physics {
     /// Softening by work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wear: Option<Wear>,
-    /// Heat.
+    /// Heat of friction and hysteresis, which changes elastic force and friction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heat: Option<Heat>,
     /// The bladder meets the braid unevenly as it widens: pressure lost is `p (1 − (R0/R)²)`, p in Pa.
@@ -129,7 +132,7 @@ pub struct BristleDamping {
 
 /// What the muscle is doing in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Moment {
+pub(crate) struct Moment {
     /// Step, s.
     pub dt: f64,
     /// Pressure in the muscle, Pa.
@@ -154,7 +157,7 @@ impl Moment {
 
 /// Memory of everything in [`Physics`].
 #[derive(Debug, Clone)]
-pub struct PhysicsState {
+pub(crate) struct PhysicsState {
     on: Physics,
     relaxation: Branches,
     creep: Branches,
@@ -303,7 +306,7 @@ impl PhysicsState {
     }
 
     /// How much longer the muscle has become, m.
-    pub fn rest_shift(&self) -> f64 {
+    pub(crate) fn rest_shift(&self) -> f64 {
         let slipped = self.on.slip.map_or(0.0, |s| s.travel * ((self.clock - s.time) / 0.05).clamp(0.0, 1.0));
         slipped + self.set
     }

@@ -31,7 +31,7 @@ pub struct Readings {
     pub pressure: f64,
     /// Contraction stroke, m.
     pub stroke: f64,
-    /// N.
+    /// Reading of the load cell, N.
     pub force: f64,
     /// Bladder temperature, °C.
     pub temperature: f64,

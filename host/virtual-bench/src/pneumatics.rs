@@ -10,7 +10,7 @@ use crate::valves::{Open, Valves};
 use serde::{Deserialize, Serialize};
 
 /// Atmospheric pressure, Pa.
-pub const ATMOSPHERE: f64 = 101_325.0;
+pub(crate) const ATMOSPHERE: f64 = 101_325.0;
 
 /// A regulator, its line and its faults.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,7 +52,7 @@ impl Default for Pneumatics {
 
 /// The air's state.
 #[derive(Debug, Clone)]
-pub struct Air {
+pub(crate) struct Air {
     with: Pneumatics,
     held: f64,
     regulator: f64,
@@ -107,7 +107,7 @@ impl Air {
     }
 
     /// Advance by `dt` (s) to an inner volume (m³) with a pair of valves in place of regulator and line; gives the pressure in the muscle, Pa.
-    pub fn advance_valves(&mut self, dt: f64, valves: &mut Valves, signals: Open, volume: f64) -> f64 {
+    pub(crate) fn advance_valves(&mut self, dt: f64, valves: &mut Valves, signals: Open, volume: f64) -> f64 {
         let before = self.volume.unwrap_or(volume);
         self.volume = Some(volume);
         let gained = dt * valves.rate(dt, signals, self.muscle) * self.rest_volume;
@@ -129,13 +129,8 @@ impl Air {
     }
 
     /// The pressure in the muscle, Pa.
-    pub fn in_muscle(&self) -> f64 {
+    pub(crate) fn in_muscle(&self) -> f64 {
         self.muscle
-    }
-
-    /// Put regulator and muscle at a pressure (Pa) without a transient.
-    pub fn settle(&mut self, pressure: f64) {
-        (self.held, self.regulator, self.muscle) = (pressure, pressure, pressure);
     }
 }
 
@@ -156,7 +151,7 @@ mod tests {
     fn a_growing_volume_lowers_the_pressure_by_the_gas_law_when_the_line_is_shut() {
         let shut = Pneumatics { line: 1e9, ..Pneumatics::default() };
         let mut a = Air::new(shut, 1e-6, 1);
-        a.settle(400e3);
+        (a.held, a.regulator, a.muscle) = (400e3, 400e3, 400e3);
         a.advance(1e-3, 400e3, 1e-6);
         for i in 1..=1000 {
             a.advance(1e-3, 400e3, 1e-6 * (1.0 + 0.1 * f64::from(i) / 1000.0));

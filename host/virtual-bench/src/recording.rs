@@ -33,18 +33,18 @@ pub struct Recording {
 /// Which optional columns are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Columns {
-    /// `pressure_command_kPa`
+    /// Whether the column `pressure_command_kPa` is written.
     pub command: bool,
-    /// `temperature_C`
+    /// Whether the column `temperature_C` is written.
     pub temperature: bool,
-    /// `cycle`
+    /// Whether the column `cycle` is written.
     pub cycle: bool,
 }
 
 /// Newtons of one pound-force.
 const POUND_FORCE: f64 = 4.448_221_615_260_5;
 /// Pounds-force of one unit of the thesis's load-cell reading.
-pub const LOAD_CELL: f64 = 508.41;
+pub(crate) const LOAD_CELL: f64 = 508.41;
 
 impl Recording {
     /// CSV with `time_s,pressure_kPa,displacement_mm,force_N` and the optional columns requested.

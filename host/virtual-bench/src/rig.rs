@@ -36,7 +36,7 @@ pub struct Rig {
 
 /// The rig's memory.
 #[derive(Debug, Clone)]
-pub struct RigState {
+pub(crate) struct RigState {
     with: Rig,
     played: Option<f64>,
     last: Option<(f64, f64)>,
@@ -54,7 +54,7 @@ const SOLUTION_STEPS: usize = 60;
 const GUIDE_TRAVEL: f64 = 20e-6;
 
 impl RigState {
-    /// Unloaded.
+    /// A rig that has not been loaded yet.
     pub fn new(with: Rig) -> Self {
         Self { with, played: None, last: None, guide: 0.0, stuck: 0.0, clock: 0.0 }
     }
@@ -124,7 +124,7 @@ impl RigState {
     }
 
     /// Force at the cell, N.
-    pub fn at_cell(&mut self, force: f64, pressure: f64, stroke: f64, dt: f64) -> f64 {
+    pub(crate) fn at_cell(&mut self, force: f64, pressure: f64, stroke: f64, dt: f64) -> f64 {
         let w = &self.with;
         self.clock += dt;
         let (x, v) = self.last.unwrap_or((stroke, 0.0));

@@ -27,7 +27,7 @@ pub struct Branches {
 }
 
 impl Branches {
-    /// Relaxed.
+    /// All branches relaxed; without a law there are none.
     pub fn new(law: Option<Relaxation>) -> Self {
         let maxwell = law.map_or(Vec::new(), |r| {
             (0..r.branches)
@@ -111,7 +111,7 @@ pub struct Heat {
 
 /// Temperatures above the room, K.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Temperatures {
+pub(crate) struct Temperatures {
     /// Of the bladder.
     pub bladder: f64,
     /// Of the fittings.

@@ -84,7 +84,7 @@ const RELAYS: usize = 24;
 
 /// State of everything in this file.
 #[derive(Debug, Clone, Default)]
-pub struct RubbingState {
+pub(crate) struct RubbingState {
     seal: f64,
     theta: f64,
     relays: Vec<(f64, f64, bool)>,

@@ -136,7 +136,7 @@ impl Surface {
     }
 
     /// Force of the bladder alone at the moment it touches, N (its ends are pushed apart: negative).
-    pub fn contact_force(&self, length: f64) -> f64 {
+    pub(crate) fn contact_force(&self, length: f64) -> f64 {
         self.push.at(self.place(length))
     }
 
@@ -159,7 +159,7 @@ fn cylinder_parts(g: &Geometry, tube: &Tube, l: f64) -> Parts {
 /// Slices of a tapering end, per half.
 const END_SLICES: usize = 12;
 /// Length of a taper per depth.
-pub const TAPER: f64 = 2.0;
+pub(crate) const TAPER: f64 = 2.0;
 
 /// Stored energy and outer volume of the muscle with tapering ends; the middle radius follows from the fibre's length.
 fn tapered(g: &Geometry, tube: &Tube, ends: f64, e: f64, l: f64) -> (f64, f64) {

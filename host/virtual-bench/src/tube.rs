@@ -38,7 +38,7 @@ pub struct Geometry {
 
 impl Geometry {
     /// From millimetres and degrees, diameter instead of radius.
-    pub fn from_mm_deg(length_mm: f64, angle_deg: f64, diameter_mm: f64, wall_mm: f64) -> Self {
+    pub(crate) fn from_mm_deg(length_mm: f64, angle_deg: f64, diameter_mm: f64, wall_mm: f64) -> Self {
         Self {
             rest_length: length_mm * 1e-3,
             braid_angle: angle_deg.to_radians(),
@@ -64,13 +64,13 @@ impl Geometry {
     }
 
     /// Length at which the braid has radius `r` (m).
-    pub fn length_at(&self, r: f64) -> f64 {
+    pub(crate) fn length_at(&self, r: f64) -> f64 {
         let (b, around) = (self.fibre(), 2.0 * PI * self.turns() * r);
         (b * b - around * around).max(0.0).sqrt()
     }
 
     /// Its derivative by length.
-    pub fn braid_radius_slope(&self, l: f64) -> f64 {
+    pub(crate) fn braid_radius_slope(&self, l: f64) -> f64 {
         let b = self.fibre();
         -l / ((b * b - l * l).max(1e-18).sqrt() * 2.0 * PI * self.turns())
     }

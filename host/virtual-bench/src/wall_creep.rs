@@ -23,7 +23,7 @@ pub struct WallCreep {
 
 /// Changes of the wall's load: when, and by how much.
 #[derive(Debug, Clone, Default)]
-pub struct LoadHistory {
+pub(crate) struct LoadHistory {
     changes: Vec<(f64, f64)>,
     clock: f64,
     last: f64,

@@ -22,7 +22,7 @@ pub struct Context<T> {
     pub pressure_rate: T,
     /// `ΔL`, m.
     pub stroke: T,
-    /// `ΔL/L0`.
+    /// Contraction `ΔL/L0`, a fraction; 0 at rest length.
     pub contraction: T,
     /// `L`, m.
     pub length: T,
@@ -70,7 +70,7 @@ pub struct Context<T> {
     pub elastic: T,
     /// Friction-free force of the base model, N.
     pub quasi: T,
-    /// `k_F(P)`.
+    /// Friction factor `k_F(P)`, a fraction of the force without friction.
     pub friction: T,
     /// `M`, the order of the base model's elastic polynomial.
     pub order: T,

@@ -38,7 +38,7 @@ macro_rules! effect_list {
                 }
             }
 
-            /// [`Info::depends_on_pressure`]($crate::effects::Info::depends_on_pressure).
+            /// Whether its force depends on the pressure: [`Info::depends_on_pressure`]($crate::effects::Info::depends_on_pressure).
             pub const fn depends_on_pressure(self) -> bool {
                 match self {
                     $(Self::$variant =>
@@ -46,7 +46,7 @@ macro_rules! effect_list {
                 }
             }
 
-            /// [`Info::persistent`]($crate::effects::Info::persistent).
+            /// Whether its memory has to survive a power cycle: [`Info::persistent`]($crate::effects::Info::persistent).
             pub const fn is_persistent(self) -> bool {
                 match self {
                     $(Self::$variant =>

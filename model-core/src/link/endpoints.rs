@@ -28,9 +28,9 @@ pub trait Endpoint {
 /// One row of the table, for tools that list it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// Number.
+    /// Number in the frame's header.
     pub id: u8,
-    /// Name.
+    /// Name, for people.
     pub name: &'static str,
     /// Type of the setpoint, one of [`messages`](super::messages) or [`settings`](super::settings).
     pub request: &'static str,

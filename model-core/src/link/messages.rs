@@ -61,11 +61,11 @@ codes! {
         /// Nothing: zero pressure.
         #[default]
         Vent,
-        /// Pressure.
+        /// Gauge pressure of one muscle, Pa.
         Pressure,
-        /// Force.
+        /// Force of one muscle, N.
         Force,
-        /// Stroke.
+        /// Contraction stroke of one muscle, m.
         Stroke,
         /// Angle and stiffness of a joint with two muscles.
         Pair,

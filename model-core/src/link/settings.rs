@@ -434,7 +434,7 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// [`Settings::DEFAULT`].
+    /// The settings that suit the muscles of the thesis: [`Settings::DEFAULT`].
     #[inline(never)]
     fn default() -> Self {
         Self::DEFAULT

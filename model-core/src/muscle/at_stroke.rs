@@ -55,7 +55,7 @@ pub struct Parts<T> {
     pub gaylord: T,
     /// `F_NLFB(P, L)`.
     pub elastic: T,
-    /// `k_F(P)`.
+    /// Friction factor `k_F(P)`, a fraction of the force without friction.
     pub friction: T,
     /// `∂(F_G + F_NLFB)/∂P`.
     pub pressure_slope: T,

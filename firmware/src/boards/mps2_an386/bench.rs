@@ -39,7 +39,7 @@ struct Said {
     missed: u16,
 }
 
-/// CRC-16/IBM-3740.
+/// Check sum of a frame, CRC-16/IBM-3740.
 fn crc16(bytes: &[u8]) -> u16 {
     let mut crc = 0xFFFF_u16;
     for byte in bytes {

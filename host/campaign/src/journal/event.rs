@@ -68,7 +68,7 @@ pub enum Event {
         file: String,
         /// Rows in it.
         rows: u64,
-        /// Why.
+        /// Why it is worth nothing.
         reason: Spoiled,
         /// Clock at its end, s.
         end_s: f64,
@@ -86,7 +86,7 @@ pub enum Event {
     Checked {
         /// Number of the step.
         number: u32,
-        /// Which.
+        /// Which check of the bench it was.
         check: checks::Kind,
         /// Its file.
         file: String,

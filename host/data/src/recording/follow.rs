@@ -6,7 +6,7 @@ use super::motion::{self, Rates};
 use super::{Campaign, Recording};
 
 /// An unknown pause between recordings counts as this long, s.
-pub const UNKNOWN_PAUSE: f64 = 60.0;
+const UNKNOWN_PAUSE: f64 = 60.0;
 
 /// Follows the motion through a campaign's recordings, one after another.
 #[derive(Debug, Clone, Default)]

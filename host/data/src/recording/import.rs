@@ -103,10 +103,10 @@ pub enum NewRun {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Decimal {
-    /// 12.5
+    /// With a point: `12.5`.
     #[default]
     Point,
-    /// 12,5
+    /// With a comma: `12,5`.
     Comma,
 }
 

@@ -3,7 +3,7 @@
 /// A quantity that a column of a recording can hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
-    /// Time.
+    /// Time of the sample.
     Time,
     /// Gauge pressure as measured.
     Pressure,
@@ -13,9 +13,9 @@ pub enum Quantity {
     Length,
     /// Contraction ΔL/L0.
     Contraction,
-    /// Force.
+    /// Force of the muscle as measured.
     Force,
-    /// Temperature.
+    /// Temperature of the muscle.
     Temperature,
     /// Commanded gauge pressure.
     PressureCommand,

@@ -33,9 +33,9 @@ use crate::statistics::{median, quantile};
 pub enum Channel {
     /// Gauge pressure.
     Pressure,
-    /// Stroke.
+    /// Contraction stroke ΔL.
     Stroke,
-    /// Force.
+    /// Force of the muscle.
     Force,
 }
 

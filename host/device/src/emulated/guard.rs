@@ -27,7 +27,7 @@ exit "$status"
 ///
 /// # Errors
 /// The program cannot be started.
-pub fn guarded(program: &str) -> std::io::Result<Command> {
+pub(crate) fn guarded(program: &str) -> std::io::Result<Command> {
     Command::new(program)
         .arg("--version")
         .stdin(Stdio::null())

@@ -217,14 +217,14 @@ pub fn report(report: &FaultReport) -> String {
 
 /// The error that ends a command because of a fault.
 #[must_use]
-pub fn stopped(fault_report: &FaultReport) -> Error {
+pub(crate) fn stopped(fault_report: &FaultReport) -> Error {
     Error::new(DeviceCode::DeviceFault, format!("the controller stopped itself: {}", report(fault_report)))
         .help(format!("{}; then `host device faults --clear`", fault(fault_report.fault).remedy))
 }
 
 /// A value in a unit that people use: kPa and mm instead of Pa and m.
 #[must_use]
-pub fn quantity(value: f32, unit: &str) -> String {
+fn quantity(value: f32, unit: &str) -> String {
     match unit {
         "Pa" => format!("{:.1} kPa", value / 1e3),
         "m" => format!("{:.2} mm", value * 1e3),

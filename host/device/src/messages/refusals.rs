@@ -10,7 +10,7 @@ use crate::error::DeviceCode;
 
 /// A refusal as an error: what was refused, why, what to do. Long because it is a table with one row for each refusal.
 #[must_use]
-pub fn refused(request: &str, refusal: Refusal) -> Error {
+pub(crate) fn refused(request: &str, refusal: Refusal) -> Error {
     let (why, help) = match refusal {
         Refusal::UnknownEndpoint => {
             ("it does not support this request".to_owned(), "flash the firmware of this release".to_owned())

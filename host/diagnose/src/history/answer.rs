@@ -48,7 +48,7 @@ pub struct Mounting {
     pub number: usize,
     /// Active length, mm.
     pub length_mm: f64,
-    /// `ΔL/L0`.
+    /// Contraction `ΔL/L0`, a fraction; 0 at rest length.
     pub contraction: f64,
     /// How many runs.
     pub runs: usize,
@@ -345,7 +345,7 @@ pub struct History {
     pub averaged: bool,
     /// The largest force, N: the scale of errors in percent.
     pub largest_force_N: f64,
-    /// Mountings.
+    /// Every mounting, in the order of the recordings.
     pub mountings: Vec<Mounting>,
     /// The law.
     pub law: MemoryLaw,
@@ -355,7 +355,7 @@ pub struct History {
     pub runs: Vec<RunError>,
     /// Documented findings.
     pub findings: Vec<Finding>,
-    /// Layers.
+    /// What each layer takes of the squared error of unseen runs.
     pub layers: Vec<LayerShare>,
     /// For a picture.
     pub courses: Vec<Course>,

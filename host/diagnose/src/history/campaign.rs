@@ -27,7 +27,7 @@ pub(super) struct Run {
 pub(super) struct Mounting {
     /// `ΔL`, m.
     pub stroke: f64,
-    /// `ΔL/L0`.
+    /// Contraction `ΔL/L0`, a fraction; 0 at rest length.
     pub contraction: f64,
     /// Its runs, in order.
     pub runs: Vec<usize>,
@@ -40,9 +40,9 @@ pub(super) struct Points {
     pub runs: Vec<Run>,
     /// Seconds since the run's zero.
     pub time: Vec<f64>,
-    /// kPa.
+    /// Gauge pressure of each point, kPa.
     pub pressure: Vec<f64>,
-    /// N.
+    /// Measured force of each point, N.
     pub force: Vec<f64>,
     /// 1 filling, −1 emptying.
     pub direction: Vec<i8>,
@@ -63,7 +63,7 @@ impl Points {
         self.force.len()
     }
 
-    /// kPa.
+    /// The highest pressure of all points, kPa.
     pub(super) fn highest(&self) -> f64 {
         self.pressure.iter().copied().fold(0.0, f64::max)
     }

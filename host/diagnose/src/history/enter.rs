@@ -66,7 +66,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
 
 /// The recordings that may show a memory.
 #[must_use]
-pub fn reliable_recordings(campaign: &Campaign) -> Campaign {
+pub(crate) fn reliable_recordings(campaign: &Campaign) -> Campaign {
     reliable(&Screened::of(campaign))
 }
 

@@ -36,9 +36,9 @@ use round::{Round, Smoothing};
 
 /// Where the unknowns stand.
 struct Places {
-    /// `γ`.
+    /// Place of `γ`, the scale of the described area.
     gamma: usize,
-    /// `π`.
+    /// Place of `π = γ P0`.
     deadband: usize,
     /// The first amplitude: those of the memory, on which `k_F` acts, then those of the friction that follows pressure.
     layers: usize,
@@ -73,7 +73,7 @@ pub(super) struct Problem<'a> {
     length: Vec<Option<usize>>,
     /// Strokes of the shortened lengths, m.
     strokes: Vec<f64>,
-    /// `w_q(l)`.
+    /// `w_q(l)`: one row for each shortened length, one column for each combination `q`.
     directions: DMatrix<f64>,
     basis: SplineBasis,
     /// `φ_j(P)` of each point.

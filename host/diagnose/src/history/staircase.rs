@@ -14,9 +14,9 @@ use pam_data::statistics::{range, slope};
 pub(super) struct Point {
     /// s, on the recording's clock.
     pub time: f64,
-    /// Pa.
+    /// Mean gauge pressure, Pa.
     pub pressure: f64,
-    /// N.
+    /// Mean force, N.
     pub force: f64,
     /// 1 filling, −1 emptying.
     pub direction: i8,

@@ -5,7 +5,7 @@ use crate::criteria::candidates::MOST_AMPLITUDES;
 /// Which signs an amplitude may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sign {
-    /// Either.
+    /// Any sign, or zero.
     Free,
     /// Zero or more.
     Positive,

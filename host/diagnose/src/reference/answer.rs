@@ -30,7 +30,7 @@ pub enum NotComparable {
     Stroke {
         /// Its name.
         recording: String,
-        /// m.
+        /// Its stroke, m.
         stroke: f64,
     },
     /// Rows at pressures that the reference does not have.
@@ -42,14 +42,14 @@ pub enum NotComparable {
     },
     /// Too few common cells.
     FewCells {
-        /// m.
+        /// Stroke of the mounting, m.
         stroke: f64,
     },
     /// Changes that need several lengths, and the reference has one.
     OneLength,
     /// A level of pressure of strokes that only one side has, Pa.
     Level {
-        /// Pa.
+        /// Gauge pressure of the level, Pa.
         pressure: f64,
     },
     /// Changes that strokes at regulated pressures are not tested for.
@@ -108,7 +108,7 @@ pub enum Remark {
     Interpolated {
         /// Its stroke, m.
         stroke: f64,
-        /// N.
+        /// Root mean square error of the interpolated force, N.
         error: f64,
     },
     /// Nothing in the reference was recorded twice.

@@ -28,9 +28,9 @@ use pam_fit::bench::Candidate;
 /// A rest between two steps.
 #[derive(Debug, Clone, Copy)]
 struct Rest {
-    /// Pa/s.
+    /// Rate of the pressure during the rest, Pa/s; negative where air is lost.
     slope: f64,
-    /// Pa.
+    /// Mean gauge pressure, Pa.
     pressure: f64,
     /// From the rest before, Pa.
     step: f64,

@@ -9,9 +9,9 @@ use super::criteria::{LEAST_SCALE, SCALE_PRIOR};
 pub(super) struct Contrast {
     pub projector: DMatrix<f64>,
     pub residual: DVector<f64>,
-    /// Πy.
+    /// `Πy`: the residual after the levels, weighted by the inverse covariance.
     pub projected: DVector<f64>,
-    /// y'Πy.
+    /// `y'Πy`: the weighted sum of squares of the residual.
     pub energy: f64,
     /// Cells minus levels.
     pub free: f64,

@@ -15,7 +15,7 @@ use super::shapes::Change;
 pub(super) enum Kind {
     /// As it is, through all of AFTER.
     Whole,
-    /// Suddenly.
+    /// Suddenly, at one time within AFTER.
     Step,
     /// Gradually, to the end.
     Ramp,

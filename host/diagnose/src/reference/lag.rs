@@ -23,7 +23,7 @@ struct Score {
 /// What AFTER's lags differ by.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Shift {
-    /// s.
+    /// Lag of AFTER less that of BEFORE, s; positive where the force became later.
     pub lag: f64,
     /// Variance, s².
     pub variance: f64,

@@ -43,7 +43,7 @@ pub struct About {
 }
 
 /// Every change that settled cells show by a fixed shape or a course, in the order in which they are tested.
-pub const CHANGES: [Change; 15] = [
+pub(crate) const CHANGES: [Change; 15] = [
     Change::ForceOffset,
     Change::ForceGain,
     Change::GaugeGain,
@@ -149,7 +149,7 @@ impl Change {
 
     /// Its class among strokes, where a late channel and a force that grows with speed have the same shape.
     #[must_use]
-    pub fn stroke_class(self) -> Class {
+    pub(crate) fn stroke_class(self) -> Class {
         match self {
             Self::SensorDelay => Class::RateOrPhase,
             _ => self.class(),

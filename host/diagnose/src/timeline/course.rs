@@ -169,7 +169,7 @@ fn evidence(x: &[f64], residual: &[f64], freedom: f64, worth: f64) -> f64 {
 
 /// Looks for the changes of a series.
 #[must_use]
-pub fn find(dates: &[f64], series: &Series) -> Course {
+pub(crate) fn find(dates: &[f64], series: &Series) -> Course {
     let known = Known::of(dates, series);
     let n = known.value.len();
     if n < FEWEST_POINTS {

@@ -224,9 +224,9 @@ pub fn points(screened: &Screened<'_>, motions: &[Motion]) -> Points {
 
 /// When a piece ends.
 struct Steps {
-    /// m.
+    /// Most that the stroke may change within a piece, m.
     stroke: f64,
-    /// Pa.
+    /// Most that the pressure may change within a piece, Pa.
     pressure: f64,
     rows: u32,
     /// One over the ranges of stroke and pressure, 1/m and 1/Pa.

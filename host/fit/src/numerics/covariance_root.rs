@@ -22,7 +22,7 @@ pub struct CovarianceRoot {
     pub rows: usize,
     /// Columns: one per block.
     pub columns: usize,
-    /// `S`.
+    /// The entries of `S`, row after row.
     pub s: Vec<f64>,
 }
 
@@ -92,7 +92,7 @@ impl CovarianceRoot {
 
     /// The root of `A C Aᵀ`, `A` given row after row.
     #[must_use]
-    pub fn transformed(&self, a: &[Vec<f64>]) -> Self {
+    pub(crate) fn transformed(&self, a: &[Vec<f64>]) -> Self {
         let mut s = Vec::with_capacity(a.len() * self.columns);
         for row in a {
             let mut to = vec![0.0; self.columns];

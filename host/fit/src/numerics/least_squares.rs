@@ -1,6 +1,6 @@
 //! Small linear least-squares problems.
 //!
-//! [`by_blocks`] gives standard deviations for correlated rows: every block is left out in turn, because a block that pulls the
+//! `by_blocks` gives standard deviations for correlated rows: every block is left out in turn, because a block that pulls the
 //! solution towards itself leaves little of its own error in the residuals (the jackknife of clusters; R. M. Bell and D. F. McCaffrey,
 //! Survey Methodology 28 (2002) 169).
 
@@ -55,7 +55,7 @@ pub fn least_squares<const N: usize>(rows: &[([f64; N], f64)], order: usize) -> 
 
 /// Coefficients with their standard deviations, in the unit of the target per unit of each column.
 #[derive(Debug, Clone)]
-pub struct BlockSolution {
+pub(crate) struct BlockSolution {
     /// The coefficients.
     pub values: Vec<f64>,
     /// Their standard deviations.
@@ -92,7 +92,7 @@ impl Normal {
 /// `None` where the columns are linearly dependent, with all blocks or with one left out, or where there are no more blocks than
 /// columns.
 #[must_use]
-pub fn by_blocks(
+pub(crate) fn by_blocks(
     columns: &[Vec<f64>],
     y: &[f64],
     block: &[usize],

@@ -45,7 +45,7 @@ impl Symmetric {
     }
 
     /// Copies the lower half to the upper one.
-    pub fn mirror(&mut self) {
+    pub(crate) fn mirror(&mut self) {
         for i in 1..self.n {
             for j in 0..i {
                 self.a[j * self.n + i] = self.a[i * self.n + j];
@@ -74,7 +74,7 @@ impl Symmetric {
 
     /// How far rounding may move [`Symmetric::quadratic`]: much where large terms cancel.
     #[must_use]
-    pub fn quadratic_rounding(&self, x: &[f64]) -> f64 {
+    pub(crate) fn quadratic_rounding(&self, x: &[f64]) -> f64 {
         let size = |row: &[f64]| row.iter().zip(x).map(|(a, x)| (a * x).abs()).sum::<f64>();
         f64::EPSILON * self.a.chunks_exact(self.n).zip(x).map(|(row, x)| size(row) * x.abs()).sum::<f64>()
     }

@@ -18,7 +18,7 @@ pub(super) struct View<'a> {
     pub campaign: &'a Campaign,
     /// Tested pressures, or middles of intervals, Pa.
     pub levels: &'a [f64],
-    /// m.
+    /// Rest length of the muscle, m.
     pub l0: f64,
     /// Strokes of the tested lengths, m, ascending, where every recording was held at one length; otherwise empty.
     pub lengths: Vec<f64>,

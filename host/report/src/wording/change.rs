@@ -16,7 +16,7 @@ pub use super::headline::headline;
 
 /// How recordings were held out.
 #[must_use]
-pub fn split(split: Split) -> &'static str {
+pub(crate) fn split(split: Split) -> &'static str {
     match split {
         Split::OtherRecordings => "every other recording of AFTER",
         Split::None => "none: AFTER is one recording",
@@ -177,7 +177,7 @@ fn percent(share: f64) -> String {
 
 /// What could not be compared.
 #[must_use]
-pub fn not_comparable(n: &NotComparable) -> String {
+pub(crate) fn not_comparable(n: &NotComparable) -> String {
     match n {
         NotComparable::Stroke { recording, stroke } => {
             format!("`{recording}`: the reference has no recording at a stroke of {:.1} mm", stroke * 1e3)
@@ -216,7 +216,7 @@ pub fn not_comparable(n: &NotComparable) -> String {
 
 /// Whose a change is.
 #[must_use]
-pub fn owner(owner: Owner) -> &'static str {
+pub(crate) fn owner(owner: Owner) -> &'static str {
     match owner {
         Owner::Sensor => "a sensor's",
         Owner::Rig => "the rig's",
@@ -236,7 +236,7 @@ fn began(m: &Moment) -> String {
 
 /// Since when a change is there.
 #[must_use]
-pub fn since(since: &Since) -> String {
+pub(crate) fn since(since: &Since) -> String {
     match since {
         Since::Beginning => "from the first recording on".into(),
         Since::From(m) => format!("suddenly, {}", began(m)),
@@ -288,7 +288,7 @@ pub fn size(s: &Size) -> String {
 
 /// All sizes of a change, with their names where there are several.
 #[must_use]
-pub fn sizes(all: &[Size]) -> String {
+pub(crate) fn sizes(all: &[Size]) -> String {
     let named = |s: &Size| format!("{} {}", s.name.replace('_', " "), size(s));
     match all {
         [only] => size(only),
@@ -298,7 +298,7 @@ pub fn sizes(all: &[Size]) -> String {
 
 /// A size in a unit that people use, without an interval.
 #[must_use]
-pub fn in_usual_unit(value: f64, unit: &str) -> String {
+pub(crate) fn in_usual_unit(value: f64, unit: &str) -> String {
     let (scale, unit) = usual_unit(value, unit);
     format!("{}{unit}", rounded(scale * value, scale * value.abs()))
 }

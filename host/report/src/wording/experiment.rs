@@ -75,7 +75,7 @@ pub(super) fn needs_strokes(measure: Experiment) -> bool {
 
 /// What to do so that an effect would show which recordings like these conceal.
 #[must_use]
-pub fn measure(measure: Experiment) -> &'static str {
+pub(crate) fn measure(measure: Experiment) -> &'static str {
     match measure {
         Experiment::VentedReadings => "record the vented load cell before, between and after the tests",
         Experiment::Weighing => "weigh the muscle and its fittings, or turn the bench by 90°",

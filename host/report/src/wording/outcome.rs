@@ -7,7 +7,7 @@ use super::{list, region, remark};
 
 /// Whether tables that differ between pressures hide an error of the model.
 #[must_use]
-pub fn one_bladder_misfits(d: &Diagnosis) -> bool {
+pub(crate) fn one_bladder_misfits(d: &Diagnosis) -> bool {
     d.remarks.iter().any(|r| matches!(r, Remark::Concealed { .. }))
 }
 
@@ -86,7 +86,7 @@ pub fn pattern(pattern: &Pattern) -> String {
 
 /// How rows were held out.
 #[must_use]
-pub fn split(split: Split) -> String {
+pub(crate) fn split(split: Split) -> String {
     let text = match split {
         Split::Runs(runs) => {
             return format!(

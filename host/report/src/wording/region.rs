@@ -4,7 +4,7 @@ use pam_diagnose::verdict::Region;
 
 /// A region as a sentence without its full stop.
 #[must_use]
-pub fn region(r: &Region) -> String {
+pub(crate) fn region(r: &Region) -> String {
     if r.coordinate == "frequency" {
         return format!(
             "{:.0} % of the excess error is periodic in time, at {:.2} Hz",

@@ -221,7 +221,7 @@ fn refused(effect: &str, why: &Refusal) -> String {
 
 /// What happened to the effects when the table was refitted.
 #[must_use]
-pub fn reserve(r: &Reserve) -> String {
+fn reserve(r: &Reserve) -> String {
     let left_out = r.left_out.map_or(String::new(), |(plain, with)| {
         format!("; a pressure left out of the fit: {with:.2} % of blocked force against {plain:.2} %")
     });

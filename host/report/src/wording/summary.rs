@@ -84,7 +84,7 @@ pub fn summary(d: &Diagnosis) -> String {
 
 /// What the unexplained share is a share of.
 #[must_use]
-pub fn unexplained_base(d: &Diagnosis) -> &'static str {
+pub(crate) fn unexplained_base(d: &Diagnosis) -> &'static str {
     if d.missing.iter().any(is_from_history) {
         "of the squared error of unseen runs at the same mounting"
     } else {
@@ -175,7 +175,7 @@ fn effect(s: &mut String, m: &Missing) {
 
 /// What to say where the intervals of single parameters include zero although the size of the whole effect is determined.
 #[must_use]
-pub fn traded_off(m: &Missing) -> Option<&'static str> {
+pub(crate) fn traded_off(m: &Missing) -> Option<&'static str> {
     let includes_zero =
         |p: &ParameterValue| p.value != 0.0 && p.std.is_some_and(|s| NORMAL_95 * s >= p.value.abs());
     let by_slack = matches!(m.why, Why::SlackReading { .. });

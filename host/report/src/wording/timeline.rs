@@ -60,7 +60,7 @@ pub fn meaning(what: &What) -> String {
 
 /// Factor and name of the unit that people use instead of the SI unit.
 #[must_use]
-pub fn usual_unit(unit: &str) -> (f64, &'static str) {
+pub(crate) fn usual_unit(unit: &str) -> (f64, &'static str) {
     match unit {
         "Pa" => (1e-3, "kPa"),
         "m" => (1e3, "mm"),
@@ -93,7 +93,7 @@ fn with_interval(value: f64, half: Option<f64>, unit: &str) -> String {
 
 /// A point in the usual unit.
 #[must_use]
-pub fn point(p: &Point, unit: &str) -> String {
+pub(crate) fn point(p: &Point, unit: &str) -> String {
     with_interval(p.value, p.std.map(|s| NORMAL_95 * s), unit)
 }
 
@@ -259,7 +259,7 @@ fn beyond_repeats(series: &Series) -> bool {
 
 /// The text on the trend of a quantity.
 #[must_use]
-pub fn judged(series: &Series, course: &Course) -> String {
+pub(crate) fn judged(series: &Series, course: &Course) -> String {
     match (course.too_few, course.changes.len()) {
         (true, _) => "too few campaigns to judge".to_owned(),
         (_, 0) if beyond_repeats(series) => format!(

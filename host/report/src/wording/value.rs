@@ -4,7 +4,7 @@ use pam_data::statistics::NORMAL_95;
 
 /// A value with its 95 % confidence interval to two digits: `0.924 ± 0.024 N (95 %)`, `(4.59 ± 0.28)·10^-4 m (95 %)`.
 #[must_use]
-pub fn with_interval(value: f64, std: Option<f64>, unit: &str) -> String {
+pub(crate) fn with_interval(value: f64, std: Option<f64>, unit: &str) -> String {
     // Pressures are read in kPa throughout.
     if unit == "Pa" && value.abs() >= 1e3 {
         return with_interval(1e-3 * value, std.map(|s| 1e-3 * s), "kPa");

@@ -4,7 +4,7 @@ use pam_diagnose::why::{Chance, ChangePoint, Evidence, UnseenError, Why};
 
 /// The reason as text without its full stop.
 #[must_use]
-pub fn why(why: &Why) -> String {
+pub(crate) fn why(why: &Why) -> String {
     match why {
         Why::Found(e) => evidence(e),
         Why::Measured { check, value } => format!("measured with {check}: {value}"),

@@ -56,7 +56,7 @@ codes! {
 pub struct Status {
     /// State of safety.
     pub state: State,
-    /// Mode.
+    /// What the controller controls.
     pub mode: Mode,
     /// The latched fault.
     pub fault: Option<Fault>,

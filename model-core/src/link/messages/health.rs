@@ -35,7 +35,7 @@ codes! {
     }
 }
 
-/// Shapes.
+/// Number of shapes.
 pub const SHAPES: usize = Shape::ALL.len();
 /// Columns of the normal equations: the shapes, and the residual as the last.
 pub const COLUMNS: usize = SHAPES + 1;

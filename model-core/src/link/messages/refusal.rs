@@ -84,11 +84,11 @@ pub enum Field {
     ForceLoop,
     /// Stroke loop.
     StrokeLoop,
-    /// Joint.
+    /// Settings of the joint that two muscles move.
     Joint,
-    /// Regulator.
+    /// Settings of the pressure regulator.
     Regulator,
-    /// Limits.
+    /// Limits of operation.
     Limits,
     /// A sensor's watch.
     SensorWatch,

@@ -95,9 +95,9 @@ pub enum Reference {
     SetPoint,
     /// `mean + amplitude · sin(2π f t)`, without end.
     Sine {
-        /// Mean.
+        /// Value that the sine swings about, in the unit of the mode.
         mean: f32,
-        /// Amplitude.
+        /// Largest distance from the mean, in the unit of the mode.
         amplitude: f32,
         /// Frequency, Hz.
         frequency_hz: f32,
@@ -115,9 +115,9 @@ pub enum Reference {
     },
     /// A sine whose frequency goes from one value to another in proportion to time.
     Chirp {
-        /// Mean.
+        /// Value that the sine swings about, in the unit of the mode.
         mean: f32,
-        /// Amplitude.
+        /// Largest distance from the mean, in the unit of the mode.
         amplitude: f32,
         /// First frequency, Hz.
         from_hz: f32,

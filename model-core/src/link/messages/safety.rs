@@ -98,10 +98,10 @@ codes! {
     /// Which sensor a fault is about.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum Sensor {
-        /// Pressure.
+        /// Pressure sensor.
         #[default]
         Pressure,
-        /// Stroke.
+        /// Stroke sensor.
         Stroke,
         /// Load cell.
         Force,

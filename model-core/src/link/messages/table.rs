@@ -55,7 +55,7 @@ fields!(TablePiece { offset, bytes });
 /// Requests a piece of the table in use, from the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TableRead {
-    /// Muscle.
+    /// The muscle whose table is read.
     pub side: Side,
     /// Place of the first byte.
     pub offset: u32,
@@ -66,7 +66,7 @@ fields!(TableRead { side, offset });
 /// Asks to go back to the table before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct RollBack {
-    /// Muscle.
+    /// The muscle whose table is replaced by the one before.
     pub side: Side,
     /// Generation of the table to go back from, so that a request that is repeated goes back once.
     pub generation: u32,
@@ -88,7 +88,7 @@ fields!(Point { pressure_pa, stroke_m });
 /// Asks the device what its table says, so that a host can compare bit for bit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Evaluate {
-    /// Muscle.
+    /// The muscle whose table is evaluated.
     pub side: Side,
     /// Direction of motion: −1 lengthening, 0 unknown, 1 shortening.
     pub direction: i8,

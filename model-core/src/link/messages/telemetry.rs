@@ -44,9 +44,9 @@ pub struct Telemetry {
     pub tick: u64,
     /// State of safety.
     pub state: State,
-    /// Mode.
+    /// What the controller controls.
     pub mode: Mode,
-    /// the setpoint, in the unit of the mode.
+    /// The setpoint, in the unit of the mode.
     pub setpoint: f32,
     /// A pair's second value.
     pub setpoint_second: f32,
@@ -85,7 +85,7 @@ fields!(SignalsRead { side });
 pub struct MeanSignals {
     /// Ticks with readings in the mean; without any, the rest is zero.
     pub ticks: u16,
-    /// Means.
+    /// Mean of each signal of the muscle's sensors.
     pub mean: Signals,
     /// Mean of the supply air's signal, where the board has an input for it.
     pub supply: Option<f32>,

@@ -62,7 +62,7 @@ codes! {
     /// When a trace begins.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
     pub enum Trigger {
-        /// Immediately.
+        /// Immediately, with the next tick.
         #[default]
         Now,
         /// With the next start of a mode or reference.
@@ -79,7 +79,7 @@ pub struct TraceArm {
     pub variables: Vec<Variable, TRACE_VARIABLES>,
     /// One record every n ticks, at least 1.
     pub every_ticks: u16,
-    /// When.
+    /// When the recording begins.
     pub trigger: Trigger,
 }
 

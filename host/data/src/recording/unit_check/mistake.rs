@@ -7,11 +7,11 @@ use crate::statistics::extremes;
 /// The column with a mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Column {
-    /// Pressure.
+    /// The gauge pressure.
     Pressure,
-    /// Stroke.
+    /// The contraction stroke ΔL.
     Stroke,
-    /// Force.
+    /// The force of the muscle.
     Force,
 }
 

@@ -27,7 +27,7 @@ struct Bench {
 }
 
 const RUNS: usize = 4;
-/// s.
+/// Time between samples, s.
 const STEP: f64 = 0.005;
 const LENGTH: f64 = 40.0;
 

@@ -48,9 +48,9 @@ pub(super) struct Cells {
     pub group: Vec<usize>,
     /// Number of states.
     pub groups: usize,
-    /// N.
+    /// Residual of each cell less the mean of BEFORE in the same state, N; positive where AFTER pulls more.
     pub difference: DVector<f64>,
-    /// N².
+    /// Variance of each difference, N².
     pub variance: DVector<f64>,
     /// Rows of AFTER with their own memory, linearised about the model of BEFORE.
     pub rows: Rows,
@@ -67,7 +67,7 @@ pub(super) struct Cells {
     /// Share of rows on ramps of pressure at a held length, which are not compared.
     pub ramps: f64,
     pub names: Vec<String>,
-    /// s.
+    /// From the first row of AFTER to the last, s.
     pub duration: f64,
 }
 
@@ -270,9 +270,9 @@ impl Joint {
 #[derive(Default)]
 struct Matched {
     cells: Vec<Cell>,
-    /// N.
+    /// Residual of each cell less the mean of BEFORE in the same state, N.
     difference: Vec<f64>,
-    /// N².
+    /// Variance of each difference, N².
     variance: Vec<f64>,
     /// Half the hysteresis of the model, N.
     half_gap: Vec<f64>,
