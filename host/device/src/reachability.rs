@@ -1,6 +1,6 @@
 //! Why a setpoint could not be reached, and how long a run was outside the tested range of its table.
 
-use model_core::inverse::Reach;
+use model_core::inverse::Attainability;
 use model_core::link::messages::{Side, State, Telemetry};
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
@@ -167,11 +167,11 @@ impl Reachability {
             let force = Force::from_newtons(sample.setpoint);
             let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
             self.guess = found.pressure;
-            match found.reach {
-                Reach::Reached => {}
-                Reach::BeyondBlockedForce => self.beyond_blocked_force += 1,
-                Reach::BelowDeadband => self.below_deadband += 1,
-                Reach::NotRising => self.not_rising += 1,
+            match found.attainability {
+                Attainability::Attainable => {}
+                Attainability::BeyondBlockedForce => self.beyond_blocked_force += 1,
+                Attainability::BelowDeadband => self.below_deadband += 1,
+                Attainability::NotRising => self.not_rising += 1,
             }
         }
     }
