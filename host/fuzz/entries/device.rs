@@ -87,8 +87,8 @@ impl Device {
         if self.above > u32::from(settings.watch.debounce_ticks) {
             assert!(state != State::Running && self.outputs.sides[0].vent, "too much pressure vents");
         }
-        let mut spoken = [0; MAX_TOPIC];
-        while self.shared.next_outgoing(&mut spoken).is_some() {}
+        let mut frame = [0; MAX_TOPIC];
+        while self.shared.next_outgoing(&mut frame).is_some() {}
         if self.shared.has_changed() {
             self.server.keep(&self.shared);
         }
