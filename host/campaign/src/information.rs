@@ -20,12 +20,12 @@ use pam_fit::checks;
 
 use self::seen::{Seen, View};
 use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
-use crate::course::Course;
 use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, target_error};
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
 use crate::step::Step;
+use crate::step_profile::StepProfile;
 
 /// Time between two steps that a design assumes, s.
 const PAUSE_S: f64 = 10.0;
@@ -147,7 +147,7 @@ impl<'a> Design<'a> {
             return self.of_check(*check);
         }
         let begin = self.past.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
-        let step = simulated(&step.course(places), begin + PAUSE_S);
+        let step = simulated(&step.profile(places), begin + PAUSE_S);
         Seen::of(self, Some(step)).map_or_else(Gain::default, |seen| self.compare(&seen))
     }
 
@@ -293,16 +293,16 @@ fn thinned(recording: &Recording, stride: usize) -> Recording {
     }
 }
 
-/// The recording that a course makes where the muscle follows.
-fn simulated(course: &Course, begin: f64) -> Recording {
-    let (time, pressure, stroke) = course.samples(begin, SAMPLE_HZ);
+/// The recording that a profile makes where the muscle follows.
+fn simulated(profile: &StepProfile, begin: f64) -> Recording {
+    let (time, pressure, stroke) = profile.samples(begin, SAMPLE_HZ);
     let stride = time.len().div_ceil(STEP_ROWS).max(1);
     thinned(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
 }
 
-/// The recording that is expected of a course after a time, s.
-pub(crate) fn expected(course: &Course, after: f64, name: &str) -> Recording {
-    Recording { name: name.to_owned(), ..simulated(course, after + PAUSE_S) }
+/// The recording that is expected of a profile after a time, s.
+pub(crate) fn expected(profile: &StepProfile, after: f64, name: &str) -> Recording {
+    Recording { name: name.to_owned(), ..simulated(profile, after + PAUSE_S) }
 }
 
 /// What each row counts: its share of the time between independent readings.

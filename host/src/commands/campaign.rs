@@ -134,7 +134,7 @@ impl Arguments {
         // What another program runs is left alone.
         let foreign = outcome.as_ref().is_err_and(|error| error.code() == DeviceCode::DeviceInUse);
         let vented = if foreign { Ok(()) } else { vent(rigging.controller.client()).map(drop) };
-        let (outcome, course) = outcome?;
+        let (outcome, steps) = outcome?;
         vented?;
         let (complete, reason) = match outcome {
             Outcome::Complete(reason) => (true, reason),
@@ -151,7 +151,7 @@ impl Arguments {
             ended_by: &reason,
             tracking: Vec::new(),
         };
-        self.results(&mut engine, &mut rigging, &course, facts, console)
+        self.results(&mut engine, &mut rigging, &steps, facts, console)
     }
 
     fn rigging(&self, continued: bool, interrupted: &Arc<AtomicBool>, console: &Console) -> Result<Rigging> {
@@ -173,7 +173,7 @@ impl Arguments {
         &self,
         engine: &mut Engine,
         rigging: &mut Rigging,
-        course: &[Done],
+        steps: &[Done],
         mut facts: RunFacts<'_>,
         console: &Console,
     ) -> Result<()> {
@@ -186,11 +186,11 @@ impl Arguments {
             _ => Vec::new(),
         };
         pages(engine, &self.output)?;
-        let document = document(engine, course, &facts);
+        let document = document(engine, steps, &facts);
         let json = text(&document)?;
         write_whole(&self.output.join("campaign.json"), format!("{json}\n").as_bytes())?;
         let report = self.output.join("report.html");
-        write_whole(&report, in_page(page(engine, course, &document).html()).as_bytes())?;
+        write_whole(&report, in_page(page(engine, steps, &document).html()).as_bytes())?;
         if let (Some(before), true) = (&self.reference, facts.complete) {
             self.changed(engine, before, console)?;
         }
