@@ -18,7 +18,7 @@ use crate::console::Console;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{Turn, to_standard_output, write_whole};
+use pam_data::output::{FolderLock, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
@@ -131,7 +131,7 @@ impl Arguments {
         // The progress line is removed before other output.
         drop(options);
         console.detail(format!("diagnosed in {:.3} s", diagnosed.as_secs_f64()));
-        let _turn = Turn::of([
+        let _lock = FolderLock::of([
             self.output.as_deref(),
             self.json.as_deref(),
             self.next.as_deref(),
