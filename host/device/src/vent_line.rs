@@ -50,7 +50,7 @@ impl VentLine {
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let deadline = Instant::now() + OTHER_WRITER;
-        let _turn = loop {
+        let _guard = loop {
             match self.writing.try_lock() {
                 Ok(turn) => break Some(turn),
                 Err(TryLockError::Poisoned(turn)) => break Some(turn.into_inner()),

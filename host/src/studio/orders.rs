@@ -131,7 +131,7 @@ impl Shared {
         &self,
         work: impl FnOnce(&Analysis) -> Result<Answer> + Send + 'static,
     ) -> Result<Answer> {
-        let _turn = self.computing.acquire().await;
+        let _guard = self.computing.acquire().await;
         self.apart(work).await
     }
 

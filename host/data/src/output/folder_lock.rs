@@ -134,7 +134,7 @@ mod tests {
                 scope.spawn(move || {
                     for round in 0..20 {
                         let text = format!("{run} {round}");
-                        let _turn = FolderLock::of([Some(table.as_path()), None, Some(report.as_path())])
+                        let _guard = FolderLock::of([Some(table.as_path()), None, Some(report.as_path())])
                             .expect("a lock");
                         write_whole(&table, text.as_bytes()).expect("written");
                         write_whole(&report, text.as_bytes()).expect("written");

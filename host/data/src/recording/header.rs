@@ -12,7 +12,7 @@ pub(super) struct Header {
     pub dialect: Dialect,
     pub names: Vec<String>,
     /// The lines above the rows that are neither blank nor remarks: names, units, and what a program writes above them.
-    pub head: Vec<Vec<u8>>,
+    pub lines_above: Vec<Vec<u8>>,
     /// Bytes above the header or the first row.
     pub preamble: usize,
     /// Bytes and lines that the header takes.
@@ -25,7 +25,7 @@ impl Header {
         let mut header = Self::find(text, import)?;
         let above = text[..header.bytes].split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end);
         let has_content = |line: &&[u8]| !line.is_empty() && !is_remark(line, header.dialect.comment);
-        header.head = above.filter(has_content).map(<[u8]>::to_vec).collect();
+        header.lines_above = above.filter(has_content).map(<[u8]>::to_vec).collect();
         Ok(header)
     }
 
@@ -38,7 +38,7 @@ impl Header {
         let header = |dialect, names, (bytes, lines)| Self {
             dialect,
             names,
-            head: Vec::new(),
+            lines_above: Vec::new(),
             preamble: first.start,
             bytes,
             lines,

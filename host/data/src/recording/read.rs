@@ -247,7 +247,7 @@ impl<'a> Reader<'a> {
             header.dialect,
             &layout.plan.wanted,
             header.names.len(),
-            &header.head,
+            &header.lines_above,
             source.size.or(average),
             Budget::default(),
         )

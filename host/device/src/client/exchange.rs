@@ -83,7 +83,7 @@ impl Client {
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) -> Result<()> {
-        let _turn = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        let _guard = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
     }
 

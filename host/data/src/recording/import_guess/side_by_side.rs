@@ -8,7 +8,7 @@ use crate::recording::Quantity;
 /// file would pass for all of it. `false` where there is one recording.
 pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) -> bool {
     let named = |quantity: Quantity| -> Vec<usize> {
-        let is = |n: &usize| sample.columns[*n].named_for() == Some(quantity);
+        let is = |n: &usize| sample.columns[*n].quantity_by_name() == Some(quantity);
         (0..sample.columns.len()).filter(is).collect()
     };
     let [times, pressures, forces] = [Quantity::Time, Quantity::Pressure, Quantity::Force].map(named);
@@ -54,7 +54,7 @@ fn describe(sample: &Sample, recordings: usize, step: usize, used: &mut [bool], 
         let (a, b) = (&sample.columns[n], sample.columns.get(other));
         b.is_some_and(|b| {
             let unit = |c: &super::sample::SampleColumn| c.name.unit.map(|u| u.text);
-            a.named_for() == b.named_for() && unit(a) == unit(b)
+            a.quantity_by_name() == b.quantity_by_name() && unit(a) == unit(b)
         })
     };
     let all: Vec<usize> = (1..recordings).flat_map(|k| own.iter().map(move |n| n + k * step)).collect();
