@@ -76,7 +76,9 @@ impl Plane {
         let mut bins = vec![[0.0; 4]; 2 * POINT_BINS * POINT_BINS];
         for r in &campaign.recordings {
             let force = r.require_force()?;
-            for (i, d) in motion::way(&r.stroke, motion::turn(range(&r.stroke)), 0.0).into_iter().enumerate()
+            for (i, d) in motion::way(&r.stroke, motion::reversal_threshold(range(&r.stroke)), 0.0)
+                .into_iter()
+                .enumerate()
             {
                 let at = bin(r.pressure[i], pressures.0, pressures.1, POINT_BINS) * POINT_BINS
                     + bin(r.stroke[i], strokes.0, strokes.1, POINT_BINS);
@@ -217,7 +219,7 @@ fn middles(campaign: &Campaign) -> Vec<f64> {
 /// The direction of every row by the stroke, and whether the row is far enough from the last turn for friction to have turned, too.
 fn directions(stroke: &[f64]) -> (Vec<f64>, Vec<bool>) {
     let travel = range(stroke);
-    let direction = motion::way(stroke, motion::turn(travel), 0.0);
+    let direction = motion::way(stroke, motion::reversal_threshold(travel), 0.0);
     let mut start = stroke.first().copied().unwrap_or(0.0);
     let mut turned = vec![false; stroke.len()];
     for i in 1..stroke.len() {

@@ -28,14 +28,14 @@ impl Rates {
     #[must_use]
     pub fn of(recording: &Recording, motion: &Motion) -> Self {
         let n = recording.len();
-        let mut edges: Vec<usize> = motion.turns.iter().map(|t| t.index).collect();
+        let mut edges: Vec<usize> = motion.reversals.iter().map(|t| t.index).collect();
         edges.extend(motion.holds.iter().flat_map(|h| [h.start, h.end + 1]));
         edges.retain(|e| *e > 0 && *e < n);
         edges.sort_unstable();
         edges.dedup();
         let duration = recording.duration().max(f64::MIN_POSITIVE);
         let travelled: f64 = motion
-            .turns
+            .reversals
             .windows(2)
             .map(|w| (recording.stroke[w[1].index] - recording.stroke[w[0].index]).abs())
             .sum::<f64>()
