@@ -33,7 +33,7 @@
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
 //! | `localise` | which cells differ |
-//! | `course` | since what moment, suddenly or gradually |
+//! | `time_course` | since what moment, suddenly or gradually |
 //! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
 //! | `sides` | rows on both sides, sides in the wrong order |
@@ -52,7 +52,6 @@ mod closed_valves;
 mod combined;
 mod contrast;
 pub mod correction;
-mod course;
 mod detectable;
 mod gate;
 mod held_out;
@@ -80,6 +79,7 @@ mod table_error;
 mod table_surface;
 #[cfg(test)]
 mod tests;
+mod time_course;
 mod units;
 mod unknown;
 mod updated;
