@@ -5,8 +5,8 @@ use nalgebra::DVector;
 use super::cells::{Cell, rms_after};
 use super::contrast::{Contrast, evidence};
 use super::criteria::{LAG_CONTRADICTED, LAG_CORRECTED, SIZES};
-use super::gate::{self, GatedChange};
 use super::lag::{self, Shift};
+use super::leave_one_mounting_out::{self, WeighedChange};
 use super::posterior::{Cause, Posterior};
 use super::shapes::{CHANGES, Change};
 use super::surface::Surface;
@@ -106,17 +106,17 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
     }
     let units: Vec<DVector<f64>> =
         time_courses.iter().map(|(_, c)| &c.shape / rms_after(cells, &c.shape)).collect();
-    let mut changes: Vec<GatedChange<'_>> = time_courses
+    let mut changes: Vec<WeighedChange<'_>> = time_courses
         .iter()
         .zip(&units)
-        .map(|((change, time_course), shape)| GatedChange {
+        .map(|((change, time_course), shape)| WeighedChange {
             change: *change,
             shape,
             log: time_course.log,
             begins: time_course.start.at > 0.0,
         })
         .collect();
-    gate::limit(cells, contrast, &mut changes, &sizes);
+    leave_one_mounting_out::limit(cells, contrast, &mut changes, &sizes);
     let mut all: Vec<(Cause, f64)> =
         changes.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
     all.push((Cause::None, still));
