@@ -19,7 +19,7 @@ pub use experiment::{measure, proposal};
 pub(crate) use hidden::{HiddenEffect, hidden};
 pub use outcome::{one_bladder_misfits, pattern, split, verdict};
 pub use region::region;
-pub use remark::{remark, reserve};
+pub use remark::{refit_comparison, remark};
 pub use summary::{summary, traded_off, unexplained_base};
 pub use value::with_interval;
 pub use why::why;

@@ -211,8 +211,8 @@ impl Arguments {
         if !faults.is_empty() {
             console.warning(format!("{} is useless for control: {}", path.display(), faults.join(". ")));
         }
-        if let Some(reserve) = refitted.reserve {
-            answer.remarks.push(Remark::Table { file: path.display().to_string(), reserve });
+        if let Some(comparison) = refitted.comparison {
+            answer.remarks.push(Remark::Table { file: path.display().to_string(), comparison });
         } else if let Some((plain, with)) = refitted.left_out.filter(|(plain, with)| with < plain) {
             console.note(format!(
                 "{}: mean error at a pressure left out of the fit: {with:.2} % of blocked force with the named effects, {plain:.2} % without",
