@@ -111,7 +111,7 @@ impl<'a> Design<'a> {
     pub fn new(known: Knowledge<'a>, places: &Places) -> Self {
         let rows: usize = known.past.iter().map(Recording::len).sum();
         let stride = rows.div_ceil(PAST_ROWS).max(1);
-        let past = known.past.iter().map(|r| thinned(r, stride)).collect();
+        let past = known.past.iter().map(|r| downsampled(r, stride)).collect();
         let table = Table::new(known.model, known.levels, known.blocked, places);
         let library = Library::new(known.sets);
         let mut design = Self { known, past, table, library, shared: None };
@@ -282,7 +282,7 @@ fn less(before: &[f64], after: &[f64]) -> f64 {
 }
 
 /// Every nth row of a recording, without its force.
-fn thinned(recording: &Recording, stride: usize) -> Recording {
+fn downsampled(recording: &Recording, stride: usize) -> Recording {
     let pick = |v: &[f64]| v.iter().copied().step_by(stride).collect::<Vec<f64>>();
     Recording {
         name: recording.name.clone(),
@@ -297,7 +297,7 @@ fn thinned(recording: &Recording, stride: usize) -> Recording {
 fn simulated(profile: &StepProfile, begin: f64) -> Recording {
     let (time, pressure, stroke) = profile.samples(begin, SAMPLE_HZ);
     let stride = time.len().div_ceil(STEP_ROWS).max(1);
-    thinned(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
+    downsampled(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
 }
 
 /// The recording that is expected of a profile after a time, s.
