@@ -89,7 +89,7 @@ fn parameters(trace: &Trace) -> Table {
         };
         let unit = if p.unit.is_empty() { "–" } else { p.unit };
         let numbers = [p.low, p.high, *value].map(|v| significant(v, 2));
-        table.row([p.letter, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
+        table.row([p.symbol, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
     }
     table
 }

@@ -85,16 +85,16 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
 
 /// `name` without characters in its middle, so that it is no wider than `width`: names of recordings differ at both ends.
 fn shortened(name: &str, width: f64) -> String {
-    let letters: Vec<char> = name.chars().collect();
+    let characters: Vec<char> = name.chars().collect();
     let without = |gone: usize| {
-        let kept = letters.len() - gone;
-        let (start, end) = (&letters[..kept.div_ceil(2)], &letters[letters.len() - kept / 2..]);
+        let kept = characters.len() - gone;
+        let (start, end) = (&characters[..kept.div_ceil(2)], &characters[characters.len() - kept / 2..]);
         start.iter().chain(&['…']).chain(end).collect::<String>()
     };
     if inline_markup::width(name) * FONT_SIZE <= width {
         return name.to_owned();
     }
-    (1..letters.len())
+    (1..characters.len())
         .map(without)
         .find(|short| inline_markup::width(short) * FONT_SIZE <= width)
         .unwrap_or_else(|| name.to_owned())
