@@ -8,7 +8,7 @@ use pam_data::recording::Recording;
 /// The page of a comparison of `b` with `a`.
 #[must_use]
 pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
-    let names = [named("A", a, b), named("B", b, a)];
+    let names = [labelled("A", a, b), labelled("B", b, a)];
     let mut page = Page::new("Two recordings compared", format!("{} and {}", names[0], names[1]));
     page.verdict(Tone::Plain, verdict(a, b, found));
     for c in &found.columns {
@@ -43,7 +43,7 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
 }
 
 /// The label of a recording with its name; where both have the same name, with its folder.
-fn named(label: &str, one: &Recording, other: &Recording) -> String {
+fn labelled(label: &str, one: &Recording, other: &Recording) -> String {
     if one.name == other.name && !one.source.as_os_str().is_empty() {
         format!("{label}: {}", one.source.display())
     } else {

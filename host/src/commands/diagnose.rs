@@ -108,7 +108,7 @@ impl Arguments {
             return reference::run(&self, console, taken);
         }
         let start = Instant::now();
-        let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
+        let given = self.with.iter().map(|name| effects::by_name(name.trim())).collect::<Result<Vec<_>>>()?;
         let Some(path) = self.muscles.first() else {
             return Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing")
                 .help("give --muscle M.toml"));

@@ -53,7 +53,7 @@ impl Arguments {
             }
             return Ok(());
         };
-        let candidate = named(name)?;
+        let candidate = by_name(name)?;
         let taken =
             to_standard_output(&[("--json", printed(self.json)), ("--report", self.report.as_deref())])?;
         if self.json {
@@ -82,7 +82,7 @@ fn catalogue() -> Result<Vec<(pam_report::effect_trace::Trace, pam_report::Figur
 ///
 /// # Errors
 /// An unknown name; the nearest is suggested.
-pub(super) fn named(name: &str) -> Result<Candidate> {
+pub(super) fn by_name(name: &str) -> Result<Candidate> {
     Candidate::from_name(name).ok_or_else(|| unknown(name))
 }
 

@@ -58,13 +58,13 @@ struct Comparison {
     /// What repeats, N.
     noise_N: f64,
     /// Named changes.
-    missing: Vec<Named>,
+    missing: Vec<NamedChange>,
 }
 
 /// A named change of a campaign against the reference.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-struct Named {
+struct NamedChange {
     effect: String,
     probability: f64,
     value: Option<f64>,
@@ -161,7 +161,7 @@ fn campaign(visit: &Visit, comparison: Option<&ChangeReport>) -> Campaign {
                 .iter()
                 .map(|m| {
                     let size = m.parameters.first();
-                    Named {
+                    NamedChange {
                         effect: m.effect.clone(),
                         probability: m.probability,
                         value: size.map(|s| s.value),

@@ -21,7 +21,7 @@ pub(crate) struct StockDocument {
     /// differ by chance only.
     pub verdict: &'static str,
     /// The effects that are named.
-    pub missing: Vec<Named>,
+    pub missing: Vec<StockEffect>,
     pub shared: Shared,
     pub muscles: Vec<Muscle>,
     /// Standard deviations of what muscles and mountings have of their own.
@@ -48,7 +48,7 @@ pub(crate) struct Estimate {
 /// An effect of the stock.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub(crate) struct Named {
+pub(crate) struct StockEffect {
     pub effect: &'static str,
     pub law: &'static str,
     pub parameter: Estimate,
@@ -215,8 +215,8 @@ fn mountings(of: &MountedLengths) -> UnseenMountings {
 }
 
 /// The entry of the mounted lengths, where they are named.
-fn lengths(of: &MountedLengths) -> Option<Named> {
-    of.named().then(|| Named {
+fn lengths(of: &MountedLengths) -> Option<StockEffect> {
+    of.named().then(|| StockEffect {
         effect: MountingCause::Length.effect().info().name,
         law: "x = x_read + d, each mounting its own d; rms of d",
         parameter: estimate(&of.size, 1e3, "mm"),
@@ -281,7 +281,7 @@ pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
     let deviations = &answer.fitted.fit.deviations;
     let named = answer.named.as_ref().map(|(of, interval, t)| {
         let (words, scale, unit) = law(Some(*of));
-        Named {
+        StockEffect {
             effect: of.effect(),
             law: words,
             parameter: estimate(interval, scale, unit),
@@ -291,7 +291,7 @@ pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
         }
     });
     let held = answer.mounted_lengths.as_ref();
-    let missing: Vec<Named> = named.into_iter().chain(held.and_then(lengths)).collect();
+    let missing: Vec<StockEffect> = named.into_iter().chain(held.and_then(lengths)).collect();
     let own = |m: usize| held.and_then(|h| h.muscles.get(m).copied().flatten());
     StockDocument {
         schema: "pam-diagnose-stock/1",

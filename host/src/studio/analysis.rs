@@ -39,11 +39,11 @@ pub struct Analysis {
 }
 
 /// The name of a recording on the page, and its file.
-type Named = (String, PathBuf);
+type NamedFile = (String, PathBuf);
 
 #[derive(Debug, Default)]
 struct Known {
-    recordings: Vec<Named>,
+    recordings: Vec<NamedFile>,
     /// The table of the last fit that ended.
     table: Option<PathBuf>,
     reports: VecDeque<(String, Arc<str>)>,

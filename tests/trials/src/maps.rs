@@ -249,7 +249,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
             row(&mut text, map.name, "their form, fitted here", &form, force);
         }
         let quoted = Form::quoted(coefficients, correction, nominal, muscle.rest_length());
-        let published = Published::named(map.published)?;
+        let published = Published::by_name(map.published)?;
         let mut others = [Errors::default(); 2];
         for (pressure, length, measured) in &cells {
             others[0].add(measured - quoted.force(*pressure, *length));
@@ -285,7 +285,7 @@ mod tests {
         for map in &MAPS {
             let path = project.join(format!("examples/muscles/{}.toml", map.muscle));
             assert!(MuscleDescription::read(path).is_ok(), "{}", map.name);
-            assert!(Published::named(map.published).is_ok());
+            assert!(Published::by_name(map.published).is_ok());
         }
         assert!(pam_data::recording::Import::read(project.join("examples/imports/force-map.toml")).is_ok());
     }
