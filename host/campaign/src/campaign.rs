@@ -186,7 +186,7 @@ fn go(
         let finding = engine.learn(spent);
         actuation.compute(false);
         done.finding = finding?;
-        sink.event(Event::Finding { number: done.chosen.number, words: done.finding.clone() })?;
+        sink.event(Event::Finding { number: done.chosen.number, text: done.finding.clone() })?;
         observer.done(&done);
         steps.push(done);
     }

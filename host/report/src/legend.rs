@@ -56,12 +56,12 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
         let low = if both { significant(-largest, 2) } else { "0".into() };
         let high = significant(largest, 2);
         let bar = 90.0;
-        let words = [label.as_str(), &low, &high].map(|t| inline_markup::width(t) * FONT_SIZE);
-        let (a, b) = room(words[0] + 10.0 + words[1] + 6.0 + bar + 6.0 + words[2]);
+        let widths = [label.as_str(), &low, &high].map(|t| inline_markup::width(t) * FONT_SIZE);
+        let (a, b) = room(widths[0] + 10.0 + widths[1] + 6.0 + bar + 6.0 + widths[2]);
         text(&mut out, a, b + 14.0, "start", Colour::Ink, "", label);
-        let start = a + words[0] + 10.0;
+        let start = a + widths[0] + 10.0;
         text(&mut out, start, b + 14.0, "start", Colour::Ink, "", &low);
-        let left = start + words[1] + 6.0;
+        let left = start + widths[1] + 6.0;
         let cells = 9;
         for i in 0..cells {
             let place = f64::from(i) / f64::from(cells - 1);

@@ -120,7 +120,8 @@ impl Arguments {
         let mut journal = Journal::open(&self.output)?;
         let continued = !journal.events().is_empty();
         let mut rigging = self.rigging(continued, &interrupted, console)?;
-        console.note(format!("{}; Ctrl-C vents the muscle, and the same call continues", rigging.words));
+        console
+            .note(format!("{}; Ctrl-C vents the muscle, and the same call continues", rigging.description));
         let (purpose, purpose_name) = self.purpose.purpose();
         let mut engine =
             Engine::new(rigging.muscle.clone(), rigging.rig.clone(), purpose, 60.0 * self.minutes)?;
@@ -144,7 +145,7 @@ impl Arguments {
             }
         };
         let facts = RunFacts {
-            controller: &rigging.words.clone(),
+            controller: &rigging.description.clone(),
             purpose: purpose_name,
             minutes: self.minutes,
             complete,
@@ -230,13 +231,13 @@ impl Arguments {
         earlier.sort();
         let now = engine.recordings().iter().map(|r| r.source.clone().into_os_string());
         let report = self.output.join("changed.html").into_os_string();
-        let mut words = vec!["diagnose".into(), "--report".into(), report];
+        let mut arguments = vec!["diagnose".into(), "--report".into(), report];
         if let Some(muscle) = &self.muscle {
-            words.extend(["--muscle".into(), muscle.clone().into_os_string()]);
+            arguments.extend(["--muscle".into(), muscle.clone().into_os_string()]);
         }
-        words.extend(now);
-        words.push("--reference".into());
-        words.extend(earlier.into_iter().map(PathBuf::into_os_string));
-        super::diagnose::Arguments::of(words)?.run(console)
+        arguments.extend(now);
+        arguments.push("--reference".into());
+        arguments.extend(earlier.into_iter().map(PathBuf::into_os_string));
+        super::diagnose::Arguments::of(arguments)?.run(console)
     }
 }

@@ -80,10 +80,10 @@ impl Arguments {
     /// The arguments of a call that another command makes.
     ///
     /// # Errors
-    /// [`DataCode::CallInvalid`] for words that the command does not take.
-    pub(super) fn of(words: Vec<std::ffi::OsString>) -> Result<Self> {
+    /// [`DataCode::CallInvalid`] for arguments that the command does not take.
+    pub(super) fn of(arguments: Vec<std::ffi::OsString>) -> Result<Self> {
         let command = Self::augment_args(clap::Command::new("diagnose"));
-        let matches = command.try_get_matches_from(words);
+        let matches = command.try_get_matches_from(arguments);
         matches
             .and_then(|m| Self::from_arg_matches(&m))
             .map_err(|e| Error::new(DataCode::CallInvalid, e.to_string()))
@@ -160,8 +160,8 @@ impl Arguments {
             diagnose_page::page_with_residuals(&answer, &muscle.geometry(), &campaign, residuals)
         })?;
         if self.json.as_deref() != Some(Path::new("-")) {
-            let words = summary(&answer, residuals);
-            if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+            let text = summary(&answer, residuals);
+            if taken { console.note(text.trim_end()) } else { console.result(text.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
         Ok(())
@@ -250,13 +250,13 @@ fn measure_errors(
 
 /// The answer as text, with the residuals of the table without effects by recording.
 fn summary(answer: &Diagnosis, residuals: &[RecordingResidual]) -> String {
-    let mut words = wording::summary(answer);
+    let mut text = wording::summary(answer);
     let table = recording_table(residuals);
     if !table.is_empty() {
-        words += &format!("\nOf the table without effects: {table}\n");
+        text += &format!("\nOf the table without effects: {table}\n");
     }
     if let Some(history) = &answer.history {
-        words += &format!("\n{}", history_text::text(history));
+        text += &format!("\n{}", history_text::text(history));
     }
-    words
+    text
 }

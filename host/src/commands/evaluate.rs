@@ -156,12 +156,12 @@ impl Arguments {
                 return Ok(());
             }
         }
-        let words = to_text(&cases, &lengths, &stock, self.published.as_deref());
+        let text = to_text(&cases, &lengths, &stock, self.published.as_deref());
         // If the report goes to standard output, nothing else does.
         if self.reports.file() == Some(Path::new("-")) {
-            console.note(words)
+            console.note(text)
         } else {
-            console.result(words)
+            console.result(text)
         }
         Ok(())
     }

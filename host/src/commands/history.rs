@@ -106,8 +106,8 @@ impl Arguments {
         self.reports.write(console, &reports::provenance(), || timeline_page::page(&visits, &found))?;
         let printed = |p: &Option<PathBuf>| p.as_deref() == Some(Path::new("-"));
         if !printed(&self.json) && !printed(&self.csv) {
-            let words = wording::summary(&visits, &found);
-            if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+            let text = wording::summary(&visits, &found);
+            if taken { console.note(text.trim_end()) } else { console.result(text.trim_end()) }
         }
         Ok(())
     }

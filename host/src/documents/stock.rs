@@ -256,10 +256,10 @@ fn muscle(of: &MuscleOwn, mountings: Option<MuscleMountings>) -> Muscle {
 }
 
 fn tried(of: &Considered) -> Tried {
-    let (words, scale, unit) = law(of.law);
+    let (description, scale, unit) = law(of.law);
     Tried {
         effect: of.law.map(Law::effect),
-        law: words,
+        law: description,
         parameter: of.parameter.as_ref().map(|p| estimate(p, scale, unit)),
         jackknife_std: of.jackknife.map(|j| j * scale),
         left_out_error_pct: 100.0 * of.error,
@@ -280,10 +280,10 @@ fn place(of: &SharedPlace) -> Place {
 pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
     let deviations = &answer.fitted.fit.deviations;
     let named = answer.named.as_ref().map(|(of, interval, t)| {
-        let (words, scale, unit) = law(Some(*of));
+        let (description, scale, unit) = law(Some(*of));
         StockEffect {
             effect: of.effect(),
-            law: words,
+            law: description,
             parameter: estimate(interval, scale, unit),
             t: *t,
             confusable_with: answer.confusable_with.clone(),

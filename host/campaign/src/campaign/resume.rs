@@ -63,9 +63,9 @@ pub(super) fn resume(
                     finding: String::new(),
                 });
             }
-            Event::Finding { words, .. } => {
+            Event::Finding { text, .. } => {
                 if let Some(last) = steps.last_mut() {
-                    last.finding.clone_from(words);
+                    last.finding.clone_from(text);
                 }
             }
             Event::Begin { .. } | Event::Ended { .. } => {}
