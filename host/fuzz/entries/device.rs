@@ -157,8 +157,8 @@ pub fn states(bytes: &[u8]) -> Vec<State> {
         match first >> 6 {
             0 => device.hear(&take(&mut rest, n)),
             1 => {
-                let head = take(&mut rest, 2);
-                let &[id, more] = &head[..] else { break };
+                let header = take(&mut rest, 2);
+                let &[id, more] = &header[..] else { break };
                 let body = take(&mut rest, (8 * n + usize::from(more & 7)).min(MAX_BODY));
                 let mut wire = [0; MAX_WIRE];
                 let header = Header { kind: Kind::Request, id, sequence: 1 };

@@ -53,7 +53,7 @@ const HEAD: &str = "# Static force maps\n\nWritten by `cargo run --release -p tr
     host evaluate --muscle dmsp10-250.toml --import force-map.toml --leave-out contractions dmsp10_250_force_map.csv\n```\n\n\
     `examples/muscles` and `examples/imports` hold both descriptions.\n";
 
-/// Paragraph on the errors, and the head of the table.
+/// Paragraph on the errors, and the header of the table.
 const ERRORS: &str = "## Errors\n\nMean and largest |F − F_model| over the cells, in percent of the largest force of the map. \"Between\": each inner \
     length (or pressure) is predicted from the others. \"Ends\": the longest and the shortest length, or the lowest and the highest pressure, \
     which is an extrapolation.\n\n\
@@ -96,14 +96,14 @@ type Cell = (f64, f64, f64);
 fn cells(path: &Path) -> Result<Vec<Cell>, Box<dyn Error>> {
     let text = std::fs::read_to_string(path)?;
     let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().ok_or("an empty map")?.split(',').collect();
+    let header: Vec<&str> = lines.next().ok_or("an empty map")?.split(',').collect();
     let length = |name: &str| -> Option<f64> {
         Some(1e-3 * name.strip_prefix("F_L")?.strip_suffix("mm_N")?.parse::<f64>().ok()?)
     };
     let mut all = Vec::new();
     for line in lines {
         let numbers: Vec<f64> = line.split(',').filter_map(|c| c.parse().ok()).collect();
-        for (name, force) in head.iter().zip(&numbers).skip(1) {
+        for (name, force) in header.iter().zip(&numbers).skip(1) {
             all.push((numbers[0], length(name).ok_or("a heading without a length")?, *force));
         }
     }
@@ -167,15 +167,16 @@ impl Tool<'_> {
         run_limited(&mut predict, Duration::from_secs(300))?;
         let text = std::fs::read_to_string(&out).map_err(|e| e.to_string())?;
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
-        let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
+        let header: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
         let column = |name: &str| {
-            head.iter()
+            header
+                .iter()
                 .position(|h| h.starts_with(name))
-                .ok_or(format!("no column {name} in {}", head.join(",")))
+                .ok_or(format!("no column {name} in {}", header.join(",")))
         };
         let (measured, model) = (column("force_N")?, column("force_model_N")?);
         let pressure = column("pressure_")?;
-        let scale = if head[pressure].ends_with("kPa") { 1e3 } else { 1.0 };
+        let scale = if header[pressure].ends_with("kPa") { 1e3 } else { 1.0 };
         for line in lines {
             let numbers: Vec<f64> = line.split(',').map(|c| c.parse().unwrap_or(f64::NAN)).collect();
             let at = numbers.get(pressure).copied().unwrap_or(f64::NAN) * scale;

@@ -298,8 +298,8 @@ mod tests {
         );
         let remarks = of(&format!("time_s,force_N,remark\n{}", rows("0.5,7")));
         assert_eq!((remarks.names, remarks.names_at), (vec!["time_s".to_owned(), "force_N".into()], None));
-        let head = "LabVIEW Measurement\t\nY_Unit_Label\tkPa\tN\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n";
-        let labview = of(&format!("{head}X_Value\tP1\tLoad\tComment\n{}", rows("0.5\t7\t3")));
+        let header = "LabVIEW Measurement\t\nY_Unit_Label\tkPa\tN\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n";
+        let labview = of(&format!("{header}X_Value\tP1\tLoad\tComment\n{}", rows("0.5\t7\t3")));
         assert_eq!(
             (labview.names, labview.names_at),
             (vec!["Time".to_owned(), "P1".into(), "Load".into()], None)

@@ -42,7 +42,7 @@ pub(super) fn copy<R: Read>(source: &mut Window<R>, out: &mut impl Write) -> io:
         if source.peek(1)?.is_empty() {
             break;
         }
-        match if damaged { Found::Damage } else { read_head(source)? } {
+        match if damaged { Found::Damage } else { read_record_header(source)? } {
             Found::End => break,
             Found::Pass(length) => source.skip(length),
             Found::Keep(length) => {
@@ -137,7 +137,7 @@ fn own(wanted: u8) -> io::Result<Vec<u8>> {
     Ok(Vec::new())
 }
 
-fn read_head<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
+fn read_record_header<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
     let Some((kind, length)) = header(source.peek(HEAD)?) else { return Ok(Found::Damage) };
     let most = if kind == kind::CHUNK { LARGEST } else { LARGEST_OTHER };
     if length > most {
