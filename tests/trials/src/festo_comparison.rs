@@ -75,7 +75,7 @@ const PUBLISHED: [Published; 5] = [
     },
 ];
 
-/// Paragraph on the published description, and the head of its table.
+/// Paragraph on the published description, and the header of its table.
 pub const COMPARISON: &str = "### Comparison with the published description\n\n\"Named\": one of the listed effects is named. \"In a set\": such an \
     effect is confusable with a named one. \"Located there\": the excess error is located on such a coordinate. \"Could be hidden\": such an \
     effect is possible at more than 1 % of the blocked force. \"Measured\": a finding of the report measures it, its interval excludes none, \

@@ -44,7 +44,7 @@ const MAPS: [Map; 2] = [
 ];
 
 /// Beginning of the page.
-const HEAD: &str = "# Static force maps\n\nWritten by `cargo run --release -p trials -- maps -o DIR --page docs/src/force-maps.md`; nothing here is typed \
+const INTRODUCTION: &str = "# Static force maps\n\nWritten by `cargo run --release -p trials -- maps -o DIR --page docs/src/force-maps.md`; nothing here is typed \
     by hand. M. Martens and I. Boblan measured the isometric force of two commercial muscles over pressure and length (Actuators 6 (2017) 33, doi \
     10.3390/act6040033, tables A1 and A2; erratum Actuators 7 (2018) 9). The maps are read second hand, from the comparison script of another \
     laboratory, in `../shared/data` (not part of the project).\n\nA map has no time and no direction. An import description with `[grid]` reads each \
@@ -221,7 +221,7 @@ fn row(text: &mut String, map: &str, model: &str, errors: &[Errors], force: f64)
 pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(output)?;
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut text = format!("{HEAD}\n{ERRORS}");
+    let mut text = format!("{INTRODUCTION}\n{ERRORS}");
     let mut stated = String::new();
     for map in &MAPS {
         let file = data.join("martens-boblan-tables").join(map.file);
@@ -277,7 +277,7 @@ mod tests {
 
     #[test]
     fn the_page_in_the_book_has_these_texts() {
-        crate::book::contains("force-maps.md", &[HEAD, ERRORS, OTHERS]);
+        crate::book::contains("force-maps.md", &[INTRODUCTION, ERRORS, OTHERS]);
     }
 
     #[test]
