@@ -292,8 +292,8 @@ impl Subject {
         control.run(1_500);
         let mut ticks = Vec::new();
         for tick in 0..5_000_u32 {
-            let turn = std::f32::consts::TAU * hz * tick as f32 * TICK_S;
-            control.point(SetPoint::Force(mean + amplitude * turn.sin()));
+            let phase = std::f32::consts::TAU * hz * tick as f32 * TICK_S;
+            control.point(SetPoint::Force(mean + amplitude * phase.sin()));
             ticks.extend(control.run(1));
         }
         100.0 * closed_loop::rms(&ticks[1_000..], |tick| tick.force) / self.blocked()
