@@ -276,8 +276,8 @@ fn in_header(path: &Path) -> Option<f64> {
         if let Some(dated) = &columns {
             return dated.iter().find_map(|i| in_text(cells.get(*i)?));
         }
-        let named = |c: &str| DATE_COLUMNS.contains(&c.to_lowercase().as_str());
-        columns = Some((0..cells.len()).filter(|i| named(cells[*i])).collect());
+        let is_date_column = |c: &str| DATE_COLUMNS.contains(&c.to_lowercase().as_str());
+        columns = Some((0..cells.len()).filter(|i| is_date_column(cells[*i])).collect());
     }
     None
 }

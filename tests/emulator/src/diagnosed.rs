@@ -27,7 +27,7 @@ pub struct Case {
     /// What is concealed, by its name in the catalogue.
     pub effect: &'static str,
     /// What it is as text, with its size.
-    pub words: String,
+    pub description: String,
     /// The muscle without it.
     pub plain: MuscleSpec,
     /// The muscle with it.
@@ -117,8 +117,8 @@ pub fn cases() -> Vec<Case> {
         let plain = simple(seed);
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
-        let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), setpoint: setpoint(blocked), blocked }
+        let description = conceal(&mut spec, blocked, x, v);
+        Case { effect, description, plain, spec, motion: motion(x), setpoint: setpoint(blocked), blocked }
     })
     .to_vec()
 }

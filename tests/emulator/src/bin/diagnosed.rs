@@ -19,7 +19,7 @@ fn row(case: &Case, out: &mut String) -> bool {
         out,
         "| {}: {} | {} | {} | {:.3} → {:.3} | {:.2} | {:.2} | {:.2} |",
         case.effect,
-        case.words,
+        case.description,
         case.plain.name,
         if named.is_empty() { "nothing".into() } else { named.join(", ") },
         tables.rms.0,

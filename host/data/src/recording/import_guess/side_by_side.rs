@@ -7,13 +7,14 @@ use crate::recording::Quantity;
 /// Looks for recordings beside the first. Where they have the same columns, each is described; otherwise nothing is, since a part of the
 /// file would pass for all of it. `false` where there is one recording.
 pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) -> bool {
-    let named = |quantity: Quantity| -> Vec<usize> {
+    let of_quantity = |quantity: Quantity| -> Vec<usize> {
         let is = |n: &usize| sample.columns[*n].quantity_by_name() == Some(quantity);
         (0..sample.columns.len()).filter(is).collect()
     };
-    let [times, pressures, forces] = [Quantity::Time, Quantity::Pressure, Quantity::Force].map(named);
-    let strokes =
-        [Quantity::Displacement, Quantity::Length, Quantity::Contraction].map(|q| named(q).len()).into_iter();
+    let [times, pressures, forces] = [Quantity::Time, Quantity::Pressure, Quantity::Force].map(of_quantity);
+    let strokes = [Quantity::Displacement, Quantity::Length, Quantity::Contraction]
+        .map(|q| of_quantity(q).len())
+        .into_iter();
     let recordings = forces.len();
     if recordings < 2 {
         return false;
