@@ -41,8 +41,8 @@ pub(super) struct About<'a> {
     pub by: Weighing<'a>,
 }
 
-/// What was named.
-pub(super) struct Named {
+/// The changes that were named.
+pub(super) struct NamedChanges {
     /// With the trace of the lag that was tested last.
     pub cells: Vec<Cell>,
     pub accepted: Vec<Accepted>,
@@ -81,7 +81,11 @@ fn without(runs: &Runs, surface: &Surface, accepted: &[Accepted]) -> Runs {
 }
 
 /// Names changes until none is more probable than not.
-pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Cell], &Round)) -> Named {
+pub(super) fn name(
+    about: &About<'_>,
+    contrast: &Contrast,
+    (given, first): (&[Cell], &Round),
+) -> NamedChanges {
     let by = about.by;
     let mut cells = given.to_vec();
     let mut shift = by.lag.copied();
@@ -116,7 +120,7 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
                 last = weigh(&cells, &beyond(&base, &accepted), without_lag).posterior;
             }
             refit(&base, &mut accepted, &cells);
-            return Named { cells, accepted, last };
+            return NamedChanges { cells, accepted, last };
         };
         if next.change.is_lag() {
             let trace = lag::trace(&cells);
