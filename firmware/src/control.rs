@@ -302,7 +302,7 @@ impl Controller {
         let found = self.watch(inputs);
         if let Some((side, finding)) = found.gravest() {
             if self.machine.state() == State::Fault {
-                self.raise_again(side, &finding, found.venting().is_some());
+                self.raise_while_latched(side, &finding, found.venting().is_some());
             } else {
                 self.raise(side, &finding);
             }

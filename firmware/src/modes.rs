@@ -1,7 +1,7 @@
 //! The pressure demand of each mode: the mathematics between a setpoint and the regulator.
 
 use model_core::effects::{Chain, EffectName};
-use model_core::inverse::{Reach, Search};
+use model_core::inverse::{Attainability, Search};
 use model_core::link::messages::Mode;
 use model_core::link::settings::{FeedForward, Settings};
 use model_core::motion::{Motion, Slide};
@@ -250,7 +250,7 @@ impl Model {
         };
         now.context.direction = direction;
         self.slope = found.slope;
-        (found.pressure.pascals(), found.reach == Reach::Reached)
+        (found.pressure.pascals(), found.attainability == Attainability::Attainable)
     }
 
     /// `∂F/∂P` where the last search ended, N/Pa.

@@ -170,7 +170,7 @@ fn serve(
     stop: &AtomicBool,
     connected: &AtomicBool,
 ) {
-    let mut spoken = [0; MAX_TOPIC];
+    let mut frame = [0; MAX_TOPIC];
     while !stop.load(Ordering::Relaxed) {
         match listener.accept() {
             Ok((stream, _)) => {
@@ -180,7 +180,7 @@ fn serve(
                 connected.store(false, Ordering::Relaxed);
             }
             Err(_) => {
-                while shared.next_outgoing(&mut spoken).is_some() {}
+                while shared.next_outgoing(&mut frame).is_some() {}
                 thread::sleep(Duration::from_millis(2));
             }
         }

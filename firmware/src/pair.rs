@@ -132,35 +132,35 @@ fn taut(arms: [Arm<'_>; 2]) -> f32 {
     arms[0].model.taut_n().max(arms[1].model.taut_n())
 }
 
-/// What depends on a muscle's length alone, where the pulley has turned by `turn`, m, of its circumference.
-fn held_at(joint: &Joint, arm: Arm<'_>, turn: f32) -> AtStroke<f32> {
+/// What depends on a muscle's length alone, where the pulley has turned by `arc_m` of its circumference.
+fn held_at(joint: &Joint, arm: Arm<'_>, arc_m: f32) -> AtStroke<f32> {
     let mut held = AtStroke::NONE;
-    single_precision::hold(&arm.model.muscle, &mut held, Length::from_metres(joint.rest_stroke_m + turn));
+    single_precision::hold(&arm.model.muscle, &mut held, Length::from_metres(joint.rest_stroke_m + arc_m));
     held
 }
 
 /// The least and the greatest tension at an angle, N, if both muscles can pull there.
 fn tensions(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32) -> Option<(f32, f32)> {
-    let most = |arm: Arm<'_>, turn: f32| {
-        let held = held_at(joint, arm, turn);
+    let most = |arm: Arm<'_>, arc_m: f32| {
+        let held = held_at(joint, arm, arc_m);
         single_precision::parts(&arm.model.muscle, &held, Pressure::from_pascals(arm.high_pa)).quasi()
     };
-    let turn = joint.radius_m * angle_rad;
-    let (low, high) = (taut(arms), most(arms[0], turn).min(most(arms[1], -turn)));
+    let arc_m = joint.radius_m * angle_rad;
+    let (low, high) = (taut(arms), most(arms[0], arc_m).min(most(arms[1], -arc_m)));
     (high > low).then_some((low, high))
 }
 
 /// The stiffness at a tension and an angle, N·m/rad.
 fn stiffness_at(joint: &Joint, arms: [Arm<'_>; 2], angle_rad: f32, tension_n: f32) -> f32 {
-    let turn = joint.radius_m * angle_rad;
-    let resists = |arm: Arm<'_>, turn: f32| {
-        let (muscle, held) = (&arm.model.muscle, held_at(joint, arm, turn));
+    let arc_m = joint.radius_m * angle_rad;
+    let resists = |arm: Arm<'_>, arc_m: f32| {
+        let (muscle, held) = (&arm.model.muscle, held_at(joint, arm, arc_m));
         let guess = Pressure::from_pascals(0.5 * arm.high_pa);
         let force = Force::from_newtons(tension_n);
         let found = single_precision::pressure_for(muscle, &held, 0.0, force, guess, &muscle.search());
         -single_precision::stroke_slope(muscle, &held, found.pressure)
     };
-    joint.radius_m * joint.radius_m * (resists(arms[0], turn) + resists(arms[1], -turn))
+    joint.radius_m * joint.radius_m * (resists(arms[0], arc_m) + resists(arms[1], -arc_m))
 }
 
 /// Whether an angle and a stiffness are available without a load on the joint.

@@ -160,15 +160,15 @@ impl Shared {
             if self.outbox.is_full() && self.outbox.try_receive().is_ok() {
                 self.drop_one();
             }
-            self.say(Outgoing::Event(event));
+            self.enqueue(Outgoing::Event(event));
         }
         if let Some(sample) = self.with(Controller::take_sample) {
-            self.say(Outgoing::Sample(sample));
+            self.enqueue(Outgoing::Sample(sample));
         }
     }
 
-    fn say(&self, spoken: Outgoing) {
-        if self.outbox.try_send(spoken).is_err() {
+    fn enqueue(&self, outgoing: Outgoing) {
+        if self.outbox.try_send(outgoing).is_err() {
             self.drop_one();
         }
     }
@@ -209,7 +209,7 @@ impl Shared {
 
     /// The next frame to send without being asked, if there is one.
     pub fn next_outgoing(&self, out: &mut [u8; MAX_TOPIC]) -> Option<usize> {
-        self.outbox.try_receive().ok().map(|mut spoken| spoken.encode(out))
+        self.outbox.try_receive().ok().map(|mut outgoing| outgoing.encode(out))
     }
 }
 

@@ -185,24 +185,24 @@ fn parse() -> Result<Cli> {
     apply(program_name::renamed(Cli::command()), &settings)
         .try_get_matches()
         .and_then(|matches| Cli::from_arg_matches(&matches))
-        .map_err(|words| ended(&words))
+        .map_err(|message| ended(&message))
 }
 
 /// Prints help or the version, or what is wrong with a call, and ends: with status 2 for the last.
 ///
 /// A reader that stopped reading (`| head`) is not a failure; a full disk is, and comes back as an error.
-fn ended(words: &clap::Error) -> Error {
+fn ended(message: &clap::Error) -> Error {
     // A name that a shell has put in the place of `*` may hold anything.
-    let plain = words.render().to_string();
+    let plain = message.render().to_string();
     let printed = match printable(&plain) {
-        Cow::Borrowed(_) => words.print().and_then(|()| std::io::stdout().flush()),
+        Cow::Borrowed(_) => message.print().and_then(|()| std::io::stdout().flush()),
         Cow::Owned(text) => std::io::stderr().write_all(text.as_bytes()),
     };
     match printed {
-        Err(e) if !words.use_stderr() && !reader_left(&e) => {
+        Err(e) if !message.use_stderr() && !reader_left(&e) => {
             Error::new(DataCode::FileUnwritable, format!("standard output cannot be written: {e}"))
         }
-        _ => std::process::exit(words.exit_code()),
+        _ => std::process::exit(message.exit_code()),
     }
 }
 

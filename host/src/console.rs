@@ -138,8 +138,8 @@ impl Console {
 
     /// What went wrong, where, and what to do.
     pub fn error(&self, error: &Error) {
-        let head = self.paint("31", &format!("error[{}]", error.code().name()));
-        let mut text = format!("{head}: {}\n", said(error.cause()));
+        let label = self.paint("31", &format!("error[{}]", error.code().name()));
+        let mut text = format!("{label}: {}\n", said(error.cause()));
         let place = error.place().to_string();
         if !place.is_empty() {
             text += &format!("   at: {}\n", printable(&place));

@@ -73,19 +73,19 @@ fn a_killed_campaign_loses_no_row_and_continues() {
     assert!(child.wait().unwrap().success(), "an interruption is not a failure");
     let after = rows(folder);
     assert!(before.iter().all(|row| after.contains(row)), "a row is gone");
-    let course: Value =
+    let document: Value =
         serde_json::from_slice(&std::fs::read(folder.join("c/campaign.json")).unwrap()).unwrap();
     assert_eq!(
-        (course["schema"].as_str(), course["complete"].as_bool()),
+        (document["schema"].as_str(), document["complete"].as_bool()),
         (Some("pam-campaign/1"), Some(false))
     );
     assert!(campaign(folder).status().unwrap().success());
     let last = rows(folder);
     assert!(after.iter().all(|row| last.contains(row)), "a row is gone");
-    let course: Value =
+    let document: Value =
         serde_json::from_slice(&std::fs::read(folder.join("c/campaign.json")).unwrap()).unwrap();
-    assert_eq!(course["complete"].as_bool(), Some(true), "{course:#}");
-    let steps = course["steps"].as_array().unwrap();
+    assert_eq!(document["complete"].as_bool(), Some(true), "{document:#}");
+    let steps = document["steps"].as_array().unwrap();
     assert!(steps.iter().all(|s| s["why"].as_str().unwrap().ends_with('.')), "{steps:#?}");
     let numbers: Vec<u64> = steps.iter().map(|s| s["number"].as_u64().unwrap()).collect();
     assert!(numbers.windows(2).all(|w| w[1] > w[0]), "{numbers:?}");

@@ -193,7 +193,7 @@ pub enum Axis {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// What the effect's equation calls it.
-    pub letter: &'static str,
+    pub symbol: &'static str,
     /// Its name, as in the effect's documentation.
     pub name: &'static str,
     /// Its SI unit, or an empty string.
@@ -219,23 +219,23 @@ impl Parameter {
 
     /// A parameter that the force is proportional to.
     pub const fn amplitude(
-        letter: &'static str,
+        symbol: &'static str,
         name: &'static str,
         unit: &'static str,
         low: f64,
         high: f64,
     ) -> Self {
-        Self { letter, name, unit, low, high, role: Role::Amplitude, axis: Axis::Own, bounded: false }
+        Self { symbol, name, unit, low, high, role: Role::Amplitude, axis: Axis::Own, bounded: false }
     }
     /// A parameter that shapes the force.
     pub const fn shape(
-        letter: &'static str,
+        symbol: &'static str,
         name: &'static str,
         unit: &'static str,
         low: f64,
         high: f64,
     ) -> Self {
-        Self { letter, name, unit, low, high, role: Role::Shape, axis: Axis::Own, bounded: false }
+        Self { symbol, name, unit, low, high, role: Role::Shape, axis: Axis::Own, bounded: false }
     }
     /// The same with a range that no muscle and no bench exceeds.
     #[must_use]

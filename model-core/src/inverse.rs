@@ -10,11 +10,11 @@ use crate::spline::{self, Cubic};
 use crate::units::{Force, Pressure};
 use serde::{Deserialize, Serialize};
 
-/// Whether the force can be reached, and if not, why.
+/// Whether a pressure gives the demanded force, and if not, why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Reach {
+pub enum Attainability {
     /// The pressure gives the demanded force.
-    Reached,
+    Attainable,
     /// The muscle cannot pull that hard at this stroke: the pressure is the highest allowed.
     BeyondBlockedForce,
     /// Even the lowest pressure pulls harder: the pressure is the lowest allowed.
@@ -30,8 +30,8 @@ pub struct Solution<T> {
     pub pressure: Pressure<T>,
     /// `∂F/∂P` there, N/Pa.
     pub slope: T,
-    /// Whether the force is reached.
-    pub reach: Reach,
+    /// Whether it gives the demanded force.
+    pub attainability: Attainability,
     /// Newton and bisection steps taken.
     pub steps: u8,
 }
@@ -133,26 +133,26 @@ fn solve<T: Scalar>(
             before = if jumps { T::ZERO } else { size };
         }
     };
-    let mut reach = Reach::Reached;
+    let mut attainability = Attainability::Attainable;
     if !(p > lowest && p < highest && steps < MAX_STEPS) {
         p = p.at_least(lowest).at_most(highest);
-        reach = judge(miss, slope, tolerance);
+        attainability = judge(miss, slope, tolerance);
     }
-    Solution { pressure: Pressure::from_pascals(p), slope, reach, steps }
+    Solution { pressure: Pressure::from_pascals(p), slope, attainability, steps }
 }
 
 /// Why a search ended at a limit: by what was missed at its last pressure.
 #[cold]
 #[inline(never)]
-fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Reach {
+fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Attainability {
     if miss.abs() <= slope.abs() * tolerance * T::from_f32(2.0) {
-        Reach::Reached
+        Attainability::Attainable
     } else if !(slope > T::ZERO) {
-        Reach::NotRising
+        Attainability::NotRising
     } else if miss < T::ZERO {
-        Reach::BeyondBlockedForce
+        Attainability::BeyondBlockedForce
     } else {
-        Reach::BelowDeadband
+        Attainability::BelowDeadband
     }
 }
 
@@ -324,8 +324,8 @@ impl<T: Scalar> Muscle<T> {
             let ends = size <= tolerance;
             let holds = base.holds(next);
             if ends || (holds && size * size <= tolerance * before) {
-                let (pressure, reach) = (Pressure::from_pascals(next), Reach::Reached);
-                return Ok(Solution { pressure, slope, reach, steps });
+                let (pressure, attainability) = (Pressure::from_pascals(next), Attainability::Attainable);
+                return Ok(Solution { pressure, slope, attainability, steps });
             }
             if !holds {
                 return Err(Pressure::from_pascals(next));

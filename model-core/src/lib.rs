@@ -19,7 +19,7 @@
 //! Force of a table, and the pressure for a force at the same stroke:
 //!
 //! ```
-//! use model_core::inverse::Reach;
+//! use model_core::inverse::Attainability;
 //! use model_core::muscle::Muscle;
 //! use model_core::table;
 //! use model_core::units::{Length, Pressure};
@@ -30,7 +30,7 @@
 //!
 //! let guess = Pressure::from_kilopascals(300.0);
 //! let found = muscle.pressure_for(force, &muscle.at_stroke(stroke), shortening, guess, &muscle.search());
-//! assert_eq!(found.reach, Reach::Reached);
+//! assert_eq!(found.attainability, Attainability::Attainable);
 //! assert!((found.pressure.pascals() - 400e3).abs() < 1.0, "to within 1 Pa");
 //! ```
 //!

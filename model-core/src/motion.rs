@@ -2,7 +2,7 @@
 //!
 //! Which way friction points: while the muscle moves, the sign of its speed. While its length is held and the pressure
 //! changes, filling counts as shortening and emptying as lengthening. While neither changes, the last direction stays.
-//! Sensor noise and a regulator's ripple must not flip it: a turn counts only after a travel back that noise cannot make.
+//! Sensor noise and a regulator's ripple must not flip it: a reversal counts only after a travel back that noise cannot make.
 
 use crate::scalar::Scalar;
 
@@ -23,9 +23,9 @@ pub struct Motion<T> {
     pub pressure_rate: T,
     /// +1 shortening, −1 lengthening, 0 unknown.
     pub direction: T,
-    /// Travel since the last turn, m.
+    /// Travel since the last reversal, m.
     pub travel: T,
-    /// Time since the last turn, s.
+    /// Time since the last reversal, s.
     pub since_reversal: T,
     /// How long the muscle rested before its present motion, or has been resting, s.
     pub hold_time: T,
@@ -37,10 +37,10 @@ pub struct Motion<T> {
     pub temperature: T,
 }
 
-/// What counts as a turn and how fast rates follow.
+/// What counts as a reversal and how fast rates follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionSettings<T> {
-    /// Travel back that counts as a turn, m; above the stroke sensor's noise.
+    /// Travel back that counts as a reversal, m; above the stroke sensor's noise.
     pub stroke_threshold: T,
     /// Change of pressure at held length that counts as filling or emptying, Pa; above ripple.
     pub pressure_threshold: T,
@@ -69,10 +69,10 @@ pub struct MotionTracker<T> {
     started: bool,
     last_stroke: T,
     last_pressure: T,
-    /// The farthest point of the present stroke: a turn is measured from here.
+    /// The farthest point of the present stroke: a reversal is measured from here.
     extreme: T,
     pressure_extreme: T,
-    turns: T,
+    reversals: T,
     /// Where the muscle has been, to within the threshold, for `quiet` seconds: noise does not end a rest.
     anchor: T,
     quiet: T,
@@ -90,7 +90,7 @@ impl<T: Scalar> MotionTracker<T> {
             last_pressure: T::ZERO,
             extreme: T::ZERO,
             pressure_extreme: T::ZERO,
-            turns: T::ZERO,
+            reversals: T::ZERO,
             anchor: T::ZERO,
             quiet: T::ZERO,
             moving_for: T::ZERO,
@@ -142,7 +142,7 @@ impl<T: Scalar> MotionTracker<T> {
         }
         self.last_stroke = stroke;
         self.last_pressure = pressure;
-        self.turn(stroke, pressure);
+        self.detect_reversal(stroke, pressure);
         &self.motion
     }
 
@@ -151,7 +151,7 @@ impl<T: Scalar> MotionTracker<T> {
         self.settings.stroke_threshold / self.settings.rest_speed
     }
 
-    fn turn(&mut self, stroke: T, pressure: T) {
+    fn detect_reversal(&mut self, stroke: T, pressure: T) {
         let resting = self.motion.speed.abs() < self.settings.rest_speed || self.quiet >= self.rest_after();
         let m = &mut self.motion;
         // Forward is where the present stroke goes; before the first motion both ways are open.
@@ -188,10 +188,10 @@ impl<T: Scalar> MotionTracker<T> {
 
     fn begin(&mut self, direction: T, stroke: T, pressure: T) {
         if direction != self.motion.direction {
-            self.turns += T::ONE;
-            self.motion.cycles = self.turns * T::from_f32(0.5);
+            self.reversals += T::ONE;
+            self.motion.cycles = self.reversals * T::from_f32(0.5);
             self.motion.since_reversal = T::ZERO;
-            // A turn in the middle of a motion comes after no rest.
+            // A reversal in the middle of a motion comes after no rest.
             if self.moving_for > self.rest_after() {
                 self.motion.hold_time = T::ZERO;
             }
@@ -294,7 +294,7 @@ mod tests {
         let after: Vec<f64> = go.clone().chain(rest.clone()).chain(back.clone()).collect();
         let timed = with_noise(after);
         assert!((timed - 5.0).abs() < 0.1, "{timed} s");
-        // A turn without a rest, more than a second later, forgets it.
+        // A reversal without a rest, more than a second later, forgets it.
         assert_eq!(with_noise(go.chain(rest).chain(back).chain(on).collect()), 0.0);
     }
 

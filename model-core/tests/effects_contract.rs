@@ -4,7 +4,7 @@
 use model_core::effects::{
     Chain, Context, EffectName, FittedEffect, MAX_PARAMETERS, MEMORY, Memory, Role, Start,
 };
-use model_core::inverse::Reach;
+use model_core::inverse::Attainability;
 use model_core::motion::{MotionSettings, MotionTracker};
 use model_core::muscle::{Muscle, OperatingPoint};
 use model_core::table;
@@ -323,7 +323,7 @@ proptest! {
                 let found = muscle.pressure_with(
                     Force::from_newtons(wanted), &chain, &point, Pressure::from_pascals(guess), &muscle.search(),
                 );
-                prop_assert_eq!(found.reach, Reach::Reached, "{:?}", names);
+                prop_assert_eq!(found.attainability, Attainability::Attainable, "{:?}", names);
                 let again = force_at(found.pressure.pascals());
                 let near = (found.slope.abs() * 2.0).max(1e-9);
                 prop_assert!((again - wanted).abs() <= near, "{:?}: {} for {}", &names[..count], again, wanted);
@@ -357,7 +357,7 @@ proptest! {
             Force::from_newtons(wanted), &chain, &point, Pressure::from_kilopascals(300.0), &muscle.search(),
         );
         prop_assert!(found.pressure.pascals() >= 0.0 && found.pressure <= muscle.max_pressure());
-        if found.reach == Reach::BeyondBlockedForce {
+        if found.attainability == Attainability::BeyondBlockedForce {
             prop_assert_eq!(found.pressure, muscle.max_pressure());
         }
     }

@@ -25,7 +25,7 @@ impl Controller {
     }
 
     /// A fault while one is latched: counted when it comes up; one that vents ends a hold.
-    pub(super) fn raise_again(&mut self, side: Side, finding: &Finding, ends_hold: bool) {
+    pub(super) fn raise_while_latched(&mut self, side: Side, finding: &Finding, ends_hold: bool) {
         let holds = !self.is_vented();
         if !(holds && ends_hold) {
             if self.present != Some(finding.fault) {

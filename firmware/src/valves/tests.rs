@@ -52,8 +52,8 @@ fn the_pressure_follows_a_step_with_the_lag_of_the_settings_up_and_down() {
         let mut bench = Bench::new(|s| (s.regulator.lag_s, s.valves.period_ticks) = (lag_s, ticks));
         let lag_ticks = (lag_s * 1e3) as usize;
         for (from, to) in [(0.0, 80e3), (80e3, 200e3), (200e3, 300e3), (300e3, 240e3), (240e3, 200e3)] {
-            let course = bench.hold(to, 10 * lag_ticks as u32);
-            let gone = |at: usize| (course[at] - from) / f64::from(to - from as f32);
+            let response = bench.hold(to, 10 * lag_ticks as u32);
+            let gone = |at: usize| (response[at] - from) / f64::from(to - from as f32);
             // After one lag 1 − 1/e is gone, and no more than a period earlier or two later.
             let (early, late) = (lag_ticks - usize::from(ticks), lag_ticks + 2 * usize::from(ticks));
             assert!(
@@ -62,9 +62,9 @@ fn the_pressure_follows_a_step_with_the_lag_of_the_settings_up_and_down() {
                 gone(early),
                 gone(late)
             );
-            let rest = course.last().expect("ticks") - f64::from(to);
+            let rest = response.last().expect("ticks") - f64::from(to);
             assert!(rest.abs() < 2.5e3, "{rest} Pa from {to}, lag {lag_s} s, {ticks} ticks");
-            let beyond = course.iter().map(|p| (p - f64::from(to)) * f64::from(to - from as f32).signum());
+            let beyond = response.iter().map(|p| (p - f64::from(to)) * f64::from(to - from as f32).signum());
             assert!(beyond.fold(0.0, f64::max) < 3e3, "overshoot towards {to}, lag {lag_s} s, {ticks} ticks");
         }
     }
@@ -124,8 +124,8 @@ fn at_the_demanded_pressure_both_valves_rest() {
 #[test]
 fn valves_that_are_too_large_leave_an_error_and_do_not_oscillate() {
     let mut bench = Bench::new(|s| (s.valves.fill_pa_per_s, s.valves.vent_pa_per_s) = (30e6, 30e6));
-    let course = bench.hold(300e3, 2_000);
-    assert!(course[1_000..].iter().all(|p| (p - 300e3).abs() < 16e3), "{:?}", &course[1_990..]);
+    let response = bench.hold(300e3, 2_000);
+    assert!(response[1_000..].iter().all(|p| (p - 300e3).abs() < 16e3), "{:?}", &response[1_990..]);
     bench.muscle.pulses = [0; 2];
     bench.hold(300e3, 1_000);
     assert_eq!(bench.muscle.pulses, [0; 2]);
@@ -138,8 +138,8 @@ fn a_leak_is_met_by_pulses_that_no_valve_could_make_one_by_one() {
     bench.muscle.leak = 0.2 * REST / (GAS_J_PER_MOL_K * AIR_K);
     bench.hold(300e3, 1_000);
     bench.muscle.pulses = [0; 2];
-    let course = bench.hold(300e3, 2_000);
-    assert!((mean(&course) - 300e3).abs() < 3e3, "{}", mean(&course));
+    let response = bench.hold(300e3, 2_000);
+    assert!((mean(&response) - 300e3).abs() < 3e3, "{}", mean(&response));
     let [fill, vent] = bench.muscle.pulses;
     assert!((20..150).contains(&fill) && vent == 0, "{fill} and {vent} pulses in 200 periods");
 }
@@ -151,9 +151,9 @@ fn a_muscle_that_widens_is_filled_and_one_that_narrows_is_vented() {
         bench.muscle.volume = 1.5;
         bench.hold(300e3, 1_000);
         bench.muscle.widening = widening;
-        let course = bench.hold(300e3, 500);
+        let response = bench.hold(300e3, 500);
         // Without regard to the volume, the pressure would be behind by (p + p_atm)·V̇/V·lag: 4 to 5 kPa.
-        let off = mean(&course[200..]) - 300e3;
+        let off = mean(&response[200..]) - 300e3;
         assert!(off.abs() < 3e3, "{off} Pa at {widening}/s");
     }
 }
@@ -185,8 +185,8 @@ fn no_pressure_leaves_the_vent_valve_open_so_that_a_leaking_fill_valve_fills_not
     let whole = Valves::Period { fill_us: 0, vent_us: 10_000, length_us: 10_000 };
     assert_eq!(bench.tick(&Command { pressure_pa: 0.0, vent: false }), whole);
     bench.muscle.leak = -1e-3 * REST;
-    let course = bench.hold(0.0, 2_000);
-    assert!(course[1_999] < 3e3, "{}", course[1_999]);
+    let response = bench.hold(0.0, 2_000);
+    assert!(response[1_999] < 3e3, "{}", response[1_999]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Simulates a campaign on the virtual bench and prints its course: `cargo run --release -p pam-campaign --example simulate_campaign --
+//! Simulates a campaign on the virtual bench and prints its steps: `cargo run --release -p pam-campaign --example simulate_campaign --
 //! MUSCLE MINUTES`.
 
 use pam_campaign::bench::VirtualBench;

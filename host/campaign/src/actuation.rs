@@ -1,9 +1,9 @@
-//! What carries out a course: a controller over its link, or the virtual bench.
+//! What carries out a profile: a controller over its link, or the virtual bench.
 
 use pam_data::error::Result;
 use pam_fit::checks;
 
-use crate::course::Course;
+use crate::step_profile::StepProfile;
 
 /// One reading, SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -22,7 +22,7 @@ pub struct Reading {
     pub recorded: bool,
 }
 
-/// How a course ended.
+/// How a profile ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// It is complete.
@@ -39,11 +39,15 @@ pub trait Actuation {
     /// Sets the clock: a resumed campaign continues later than it stopped.
     fn set_clock(&mut self, seconds: f64);
 
-    /// Carries out a course; `each` is handed every reading and says whether to go on.
+    /// Carries out a profile; `each` is handed every reading and says whether to go on.
     ///
     /// # Errors
     /// What the device or its link fails with, and what `each` fails with.
-    fn perform(&mut self, course: &Course, each: &mut dyn FnMut(&Reading) -> Result<bool>) -> Result<Ending>;
+    fn perform(
+        &mut self,
+        profile: &StepProfile,
+        each: &mut dyn FnMut(&Reading) -> Result<bool>,
+    ) -> Result<Ending>;
 
     /// Carries out a check of the bench and gives its table as CSV; `None` where it cannot be made.
     ///

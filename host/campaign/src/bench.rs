@@ -7,8 +7,8 @@ use virtual_bench::bench::{Bench, BenchSpec};
 use virtual_bench::checks;
 
 use crate::actuation::{Actuation, Ending, Reading};
-use crate::course::{Course, Segment};
 use crate::criteria::SAMPLE_HZ;
+use crate::step_profile::{Segment, StepProfile};
 
 /// A muscle on the virtual bench.
 #[derive(Debug)]
@@ -132,10 +132,14 @@ impl Actuation for VirtualBench {
         self.ahead = seconds - self.bench.clock();
     }
 
-    fn perform(&mut self, course: &Course, each: &mut dyn FnMut(&Reading) -> Result<bool>) -> Result<Ending> {
+    fn perform(
+        &mut self,
+        profile: &StepProfile,
+        each: &mut dyn FnMut(&Reading) -> Result<bool>,
+    ) -> Result<Ending> {
         let mut ending = Ending::Whole;
         let mut failed = None;
-        for (segment, recorded) in &course.segments {
+        for (segment, recorded) in &profile.segments {
             match self.segment(segment, *recorded, each) {
                 Ok(true) => {}
                 Ok(false) => {

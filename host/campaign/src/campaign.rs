@@ -14,14 +14,14 @@ use self::resume::resume;
 use self::sink::{InMemory, OnDisk, Sink};
 use crate::actuation::{Actuation, Ending, Reading};
 use crate::bench::VirtualBench;
-use crate::course::Course;
 use crate::criteria::{REPEATS, TOP_SHARE};
 use crate::engine::{Decision, Engine};
 use crate::journal::{Chosen, Completion, Event, Journal, unix_seconds};
 use crate::step::Step;
+use crate::step_profile::StepProfile;
 use crate::watch::{Limits, Spoiled, Watch};
 
-/// One step of the course, as it was carried out.
+/// One step of the campaign, as it was carried out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Done {
     /// Why it was chosen.
@@ -99,10 +99,10 @@ fn read(path: &Path, muscle: &MuscleDescription) -> Result<Recording> {
 /// # Errors
 /// What a diagnosis fails with.
 pub fn simulate(engine: &mut Engine, bench: &mut VirtualBench, checks: Option<&Path>) -> Result<Vec<Done>> {
-    let mut course = Vec::new();
+    let mut steps = Vec::new();
     let mut sink = InMemory { checks };
-    go(engine, bench, &mut sink, &mut Alone, 0.0, &mut course)?;
-    Ok(course)
+    go(engine, bench, &mut sink, &mut Alone, 0.0, &mut steps)?;
+    Ok(steps)
 }
 
 /// Carries out a campaign in a folder, or continues the one that is there.
@@ -116,7 +116,7 @@ pub fn run(
     observer: &mut dyn Observer,
 ) -> Result<(Outcome, Vec<Done>)> {
     let muscle = engine.muscle().clone();
-    let (mut course, spent) = resume(engine, journal, &muscle)?;
+    let (mut steps, spent) = resume(engine, journal, &muscle)?;
     if let Some(clock) = journal.clock() {
         // How long the program was away; less than a second is none.
         let last = journal.events().iter().rev().find_map(|e| match e {
@@ -131,7 +131,7 @@ pub fn run(
     if let Some(Event::Ended { reason, .. }) = journal.events().last()
         && !(more && reason.starts_with(crate::wording::TIME_IS_OVER))
     {
-        return Ok((Outcome::Complete(reason.clone()), course));
+        return Ok((Outcome::Complete(reason.clone()), steps));
     }
     journal.write(Event::Begin {
         schema: "pam-campaign-journal/1".into(),
@@ -140,8 +140,8 @@ pub fn run(
         clock_s: actuation.clock(),
     })?;
     let mut sink = OnDisk { journal, muscle };
-    let outcome = go(engine, actuation, &mut sink, observer, spent, &mut course)?;
-    Ok((outcome, course))
+    let outcome = go(engine, actuation, &mut sink, observer, spent, &mut steps)?;
+    Ok((outcome, steps))
 }
 
 fn last_time(engine: &Engine) -> f64 {
@@ -154,7 +154,7 @@ fn go(
     sink: &mut dyn Sink,
     observer: &mut dyn Observer,
     mut spent: f64,
-    course: &mut Vec<Done>,
+    steps: &mut Vec<Done>,
 ) -> Result<Outcome> {
     loop {
         if observer.stop() {
@@ -186,9 +186,9 @@ fn go(
         let finding = engine.learn(spent);
         actuation.compute(false);
         done.finding = finding?;
-        sink.event(Event::Finding { number: done.chosen.number, words: done.finding.clone() })?;
+        sink.event(Event::Finding { number: done.chosen.number, text: done.finding.clone() })?;
         observer.done(&done);
-        course.push(done);
+        steps.push(done);
     }
 }
 
@@ -224,7 +224,7 @@ fn one_check(
 
 /// How one attempt ended.
 enum Attempt {
-    /// The course is complete.
+    /// All steps are complete.
     Whole,
     /// A stop was requested.
     Stopped,
@@ -248,10 +248,10 @@ fn one_step(
     let mut spoiled = Vec::new();
     loop {
         // What an attempt showed may change the next one.
-        let course = chosen.step.course(engine.places());
+        let profile = chosen.step.profile(engine.places());
         let mut watch = Watch::new(limits, top, blocked);
         sink.begin(chosen.number, &chosen.step.name())?;
-        let attempt = attempt(actuation, sink, observer, &course, &mut watch);
+        let attempt = attempt(actuation, sink, observer, &profile, &mut watch);
         let end_s = actuation.clock();
         if !matches!(attempt, Ok(Attempt::Whole)) {
             let (file, rows) = sink.finish(Completion::Cut, watch.rows())?;
@@ -302,11 +302,11 @@ fn attempt(
     actuation: &mut dyn Actuation,
     sink: &mut dyn Sink,
     observer: &mut dyn Observer,
-    course: &Course,
+    profile: &StepProfile,
     watch: &mut Watch,
 ) -> Result<Attempt> {
     let mut danger = None;
-    let ending = actuation.perform(course, &mut |reading| {
+    let ending = actuation.perform(profile, &mut |reading| {
         observer.reading(reading);
         // The journal first: what the watch says of a row must not cost the row.
         if reading.recorded {

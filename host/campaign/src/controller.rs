@@ -10,8 +10,8 @@ use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_fit::checks;
 
 use crate::actuation::{Actuation, Ending, Reading};
-use crate::course::{Course, Segment, duration};
 use crate::criteria::SAMPLE_HZ;
+use crate::step_profile::{Segment, StepProfile, duration};
 use crate::stroke_axis::StrokeAxis;
 
 /// Telemetry in a second of device time: twice the recording's rate, so that a stroke ends soon after the muscle is free.
@@ -56,9 +56,9 @@ impl Controller {
     }
 }
 
-/// Where a course stands.
+/// Where a profile stands.
 struct Player<'a> {
-    course: &'a Course,
+    profile: &'a StepProfile,
     at: usize,
     begun: f64,
     /// Pressure and stroke at the beginning of the segment.
@@ -76,21 +76,21 @@ struct Shown {
 }
 
 impl<'a> Player<'a> {
-    fn new(course: &'a Course) -> Self {
-        Self { course, at: 0, begun: 0.0, from: (0.0, 0.0), command: 0.0, started: false }
+    fn new(profile: &'a StepProfile) -> Self {
+        Self { profile, at: 0, begun: 0.0, from: (0.0, 0.0), command: 0.0, started: false }
     }
 
     fn finished(&self) -> bool {
-        self.at >= self.course.segments.len()
+        self.at >= self.profile.segments.len()
     }
 
     fn recorded(&self) -> bool {
-        self.course.segments.get(self.at).is_some_and(|s| s.1)
+        self.profile.segments.get(self.at).is_some_and(|s| s.1)
     }
 
     /// Advances to a time; returns the pressure to command.
     fn advance(&mut self, elapsed: f64, shown: Shown, axis: &mut dyn StrokeAxis) -> Result<f64> {
-        while let Some((segment, _)) = self.course.segments.get(self.at) {
+        while let Some((segment, _)) = self.profile.segments.get(self.at) {
             if !self.started {
                 self.started = true;
                 self.from = (self.command, shown.stroke);
@@ -147,8 +147,12 @@ impl Actuation for Controller {
         (self.clock, self.ahead) = (seconds, None);
     }
 
-    fn perform(&mut self, course: &Course, each: &mut dyn FnMut(&Reading) -> Result<bool>) -> Result<Ending> {
-        let held = course.segments.iter().find_map(|(s, _)| match s {
+    fn perform(
+        &mut self,
+        profile: &StepProfile,
+        each: &mut dyn FnMut(&Reading) -> Result<bool>,
+    ) -> Result<Ending> {
+        let held = profile.segments.iter().find_map(|(s, _)| match s {
             Segment::Travel { to, .. } if *to > 0.0 => Some(*to),
             _ => None,
         });
@@ -162,7 +166,7 @@ impl Actuation for Controller {
             seconds: None,
             every_ticks: every,
         };
-        let player = RefCell::new(Player::new(course));
+        let player = RefCell::new(Player::new(profile));
         let shown = Cell::new(Shown::default());
         let (ended, failed) = (Cell::new(false), RefCell::new(None));
         let (ahead, clock) = (Cell::new(self.ahead), Cell::new(self.clock));

@@ -12,7 +12,7 @@ use pam_data::recording::Recording;
 use pam_diagnose::Diagnosis;
 use pam_fit::checks;
 
-pub use self::plan::{Plan, Planned};
+pub use self::plan::{Plan, PlannedStep};
 pub use self::ranking::{Ranking, Weighed};
 use crate::analysis::{Findings, diagnosed, fitted, names};
 use crate::criteria::{DIAGNOSE_EVERY, DIAGNOSE_FROM, FIT_FROM};

@@ -20,12 +20,12 @@ use pam_fit::checks;
 
 use self::seen::{Seen, View};
 use crate::columns::{Library, Memories, RowsOf, Table, Where, columns_of_rows, layout};
-use crate::course::Course;
 use crate::criteria::{EFFECT_SIZE, PAST_ROWS, PRIOR_NOTHING, SAMPLE_HZ, STEP_ROWS, target_error};
 use crate::hypothesis::{DECIDED, Hypothesis, entropy};
 use crate::left_over::{Image, LeftOver};
 use crate::places::Places;
 use crate::step::Step;
+use crate::step_profile::StepProfile;
 
 /// Time between two steps that a design assumes, s.
 const PAUSE_S: f64 = 10.0;
@@ -111,7 +111,7 @@ impl<'a> Design<'a> {
     pub fn new(known: Knowledge<'a>, places: &Places) -> Self {
         let rows: usize = known.past.iter().map(Recording::len).sum();
         let stride = rows.div_ceil(PAST_ROWS).max(1);
-        let past = known.past.iter().map(|r| thinned(r, stride)).collect();
+        let past = known.past.iter().map(|r| downsampled(r, stride)).collect();
         let table = Table::new(known.model, known.levels, known.blocked, places);
         let library = Library::new(known.sets);
         let mut design = Self { known, past, table, library, shared: None };
@@ -147,7 +147,7 @@ impl<'a> Design<'a> {
             return self.of_check(*check);
         }
         let begin = self.past.iter().filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
-        let step = simulated(&step.course(places), begin + PAUSE_S);
+        let step = simulated(&step.profile(places), begin + PAUSE_S);
         Seen::of(self, Some(step)).map_or_else(Gain::default, |seen| self.compare(&seen))
     }
 
@@ -282,7 +282,7 @@ fn less(before: &[f64], after: &[f64]) -> f64 {
 }
 
 /// Every nth row of a recording, without its force.
-fn thinned(recording: &Recording, stride: usize) -> Recording {
+fn downsampled(recording: &Recording, stride: usize) -> Recording {
     let pick = |v: &[f64]| v.iter().copied().step_by(stride).collect::<Vec<f64>>();
     Recording {
         name: recording.name.clone(),
@@ -293,16 +293,16 @@ fn thinned(recording: &Recording, stride: usize) -> Recording {
     }
 }
 
-/// The recording that a course makes where the muscle follows.
-fn simulated(course: &Course, begin: f64) -> Recording {
-    let (time, pressure, stroke) = course.samples(begin, SAMPLE_HZ);
+/// The recording that a profile makes where the muscle follows.
+fn simulated(profile: &StepProfile, begin: f64) -> Recording {
+    let (time, pressure, stroke) = profile.samples(begin, SAMPLE_HZ);
     let stride = time.len().div_ceil(STEP_ROWS).max(1);
-    thinned(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
+    downsampled(&Recording { name: "step".into(), time, pressure, stroke, ..Recording::default() }, stride)
 }
 
-/// The recording that is expected of a course after a time, s.
-pub(crate) fn expected(course: &Course, after: f64, name: &str) -> Recording {
-    Recording { name: name.to_owned(), ..simulated(course, after + PAUSE_S) }
+/// The recording that is expected of a profile after a time, s.
+pub(crate) fn expected(profile: &StepProfile, after: f64, name: &str) -> Recording {
+    Recording { name: name.to_owned(), ..simulated(profile, after + PAUSE_S) }
 }
 
 /// What each row counts: its share of the time between independent readings.

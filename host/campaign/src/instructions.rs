@@ -3,10 +3,10 @@
 use pam_fit::checks;
 use pam_protocol::{Place, Protocol, Step as ProtocolStep};
 
-use crate::course::{Course, Segment};
 use crate::criteria::SAMPLE_HZ;
 use crate::places::Places;
 use crate::step::Step;
+use crate::step_profile::{Segment, StepProfile};
 
 /// Speed at which the free end returns to rest length while nothing is recorded, mm/s.
 const RETURN_MM_S: f64 = 2.0;
@@ -14,16 +14,16 @@ const RETURN_MM_S: f64 = 2.0;
 /// The protocol file of a step, recorded under a name; nothing for a check, which has no muscle.
 #[must_use]
 pub fn protocol(step: &Step, places: &Places, name: &str) -> Option<Protocol> {
-    let course = step.course(places);
-    if course.segments.is_empty() {
+    let profile = step.profile(places);
+    if profile.segments.is_empty() {
         return None;
     }
     // As long as the free stroke is unknown, a full stroke is one to wherever the muscle is free.
     let unknown = places.model.is_none() && !(places.free > 0.0);
     let mut steps = Vec::new();
     let (mut recording, mut stroke) = (false, 0.0_f64);
-    let recorded = recorded(&course);
-    for (at, (segment, _)) in course.segments.iter().enumerate() {
+    let recorded = recorded(&profile);
+    for (at, (segment, _)) in profile.segments.iter().enumerate() {
         if recorded.contains(&at) != recording {
             recording = !recording;
             let file = ProtocolStep::File { name: name.to_owned() };
@@ -68,21 +68,21 @@ pub fn instructions(step: &Step, places: &Places) -> Vec<String> {
     if let Step::Check { check } = step {
         return of_check(*check);
     }
-    let course = step.course(places);
+    let profile = step.profile(places);
     let mut lines: Vec<String> = Vec::new();
-    let recorded = recorded(&course);
+    let recorded = recorded(&profile);
     let mut recording = false;
     let mut at = 0;
-    while at < course.segments.len() {
-        let segment = course.segments[at].0;
+    while at < profile.segments.len() {
+        let segment = profile.segments[at].0;
         if recorded.contains(&at) != recording {
             recording = !recording;
             lines.push(if recording { "Start the recording." } else { "Stop the recording." }.to_owned());
         }
-        let times = repeats(&course, at);
+        let times = repeats(&profile, at);
         if times > 1 {
             let pair: Vec<String> =
-                course.segments[at..at + 2].iter().map(|s| sentence(&s.0, places)).collect();
+                profile.segments[at..at + 2].iter().map(|s| sentence(&s.0, places)).collect();
             lines.push(format!("{times} times: {} {}", pair[0], pair[1]));
             at += 2 * times;
         } else {
@@ -97,16 +97,16 @@ pub fn instructions(step: &Step, places: &Places) -> Vec<String> {
 }
 
 /// Segments from the first that is recorded to the last: an operator records them into one file.
-fn recorded(course: &Course) -> std::ops::Range<usize> {
-    let first = course.segments.iter().position(|s| s.1);
-    let last = course.segments.iter().rposition(|s| s.1);
+fn recorded(profile: &StepProfile) -> std::ops::Range<usize> {
+    let first = profile.segments.iter().position(|s| s.1);
+    let last = profile.segments.iter().rposition(|s| s.1);
     first.unwrap_or(0)..last.map_or(0, |last| last + 1)
 }
 
 /// How often the pair of segments that begins here follows itself; at least once.
-fn repeats(course: &Course, at: usize) -> usize {
-    let Some(pair) = course.segments.get(at..at + 2) else { return 1 };
-    course.segments[at..].chunks_exact(2).take_while(|next| *next == pair).count().max(1)
+fn repeats(profile: &StepProfile, at: usize) -> usize {
+    let Some(pair) = profile.segments.get(at..at + 2) else { return 1 };
+    profile.segments[at..].chunks_exact(2).take_while(|next| *next == pair).count().max(1)
 }
 
 fn sentence(segment: &Segment, places: &Places) -> String {

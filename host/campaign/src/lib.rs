@@ -2,7 +2,7 @@
 //!
 //! | question | module |
 //! | --- | --- |
-//! | what can the rig do | [`rig`], [`menu`], [`step`], `course` |
+//! | what can the rig do | [`rig`], [`menu`], [`step`], `step_profile` |
 //! | what is known of the muscle's range | [`places`] |
 //! | how much is a step expected to inform | `information` |
 //! | what to do next, and when to stop | [`engine`] |
@@ -20,8 +20,8 @@
 //! let muscle = MuscleDescription::parse(&spec.muscle.description())?;
 //! // Three minutes: the first steps of every campaign.
 //! let mut engine = Engine::new(muscle, Rig::commanded(), Purpose::Fit, 180.0)?;
-//! let course = campaign::simulate(&mut engine, &mut VirtualBench::new(&spec), None)?;
-//! assert!(course.iter().any(|s| s.rows > 100));
+//! let steps = campaign::simulate(&mut engine, &mut VirtualBench::new(&spec), None)?;
+//! assert!(steps.iter().any(|s| s.rows > 100));
 //! # Ok::<(), pam_data::error::Error>(())
 //! ```
 
@@ -31,7 +31,6 @@ pub mod bench;
 pub mod campaign;
 mod columns;
 pub mod controller;
-mod course;
 mod criteria;
 pub mod engine;
 mod hypothesis;
@@ -45,6 +44,7 @@ pub mod prompt;
 mod purpose;
 pub mod rig;
 pub mod step;
+mod step_profile;
 pub mod stroke_axis;
 pub mod watch;
 mod wording;

@@ -49,8 +49,8 @@ impl<W: Write> Prompt<W> {
     }
 
     /// Asks, and waits for a line; false where Ctrl-C came first.
-    fn ask(&mut self, words: &str) -> Result<bool> {
-        write!(self.output, "{words}, then press Enter: ").and_then(|()| self.output.flush()).map_err(
+    fn ask(&mut self, instruction: &str) -> Result<bool> {
+        write!(self.output, "{instruction}, then press Enter: ").and_then(|()| self.output.flush()).map_err(
             |e| {
                 Error::new(
                     DeviceCode::DeviceSilent,
@@ -80,8 +80,8 @@ impl<W: Write> Prompt<W> {
 impl<W: Write> StrokeAxis for Prompt<W> {
     fn prepare(&mut self, stroke: f64) -> Result<bool> {
         if (stroke - self.now).abs() > SAME {
-            let words = format!("The muscle is vented. Move to a stroke of {:.2} mm", stroke * 1e3);
-            if !self.ask(&words)? {
+            let instruction = format!("The muscle is vented. Move to a stroke of {:.2} mm", stroke * 1e3);
+            if !self.ask(&instruction)? {
                 return Ok(false);
             }
             self.now = stroke;

@@ -3,11 +3,11 @@
 use pam_fit::checks;
 use serde::{Deserialize, Serialize};
 
-use crate::course::{Course, Segment, VENT_S};
 use crate::criteria::{
     FIRST_RAMP_SHARE, HANDLING_S, RAMP_SHARE, SLOW_RAMP_SHARE, SURVEY_HOLD, SURVEY_RAMP_SHARE,
 };
 use crate::places::Places;
+use crate::step_profile::{Segment, StepProfile, VENT_S};
 
 /// What a step does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -156,14 +156,14 @@ impl Step {
         }
     }
 
-    /// Its course on a muscle; empty for a check, which has no muscle.
+    /// Its profile on a muscle; empty for a check, which has no muscle.
     #[must_use]
-    pub fn course(&self, places: &Places) -> Course {
-        let mut builder = Builder { places, course: Course::default(), level: 0.0 };
+    pub fn profile(&self, places: &Places) -> StepProfile {
+        let mut builder = Builder { places, profile: StepProfile::default(), level: 0.0 };
         match *self {
             Self::Tare { seconds } => {
-                builder.course.skip(Segment::Vented { seconds: VENT_S });
-                builder.course.record(Segment::Vented { seconds });
+                builder.profile.skip(Segment::Vented { seconds: VENT_S });
+                builder.profile.record(Segment::Vented { seconds });
             }
             Self::BlockedRamp => builder.blocked_ramp(),
             Self::Survey { times } => {
@@ -195,14 +195,14 @@ impl Step {
             Self::Ramps { part } => builder.ramps(part),
             Self::Staircase { part, seconds } => builder.staircase(part, seconds),
             Self::Rest { seconds, level } => {
-                builder.course.skip(Segment::Vented { seconds });
+                builder.profile.skip(Segment::Vented { seconds });
                 builder.begin(level);
                 builder.loops(1.0, 1);
             }
-            Self::Check { .. } => return Course::default(),
+            Self::Check { .. } => return StepProfile::default(),
         }
         builder.end();
-        builder.course
+        builder.profile
     }
 
     /// Whether the length is held shorter than the rest length.
@@ -218,7 +218,7 @@ impl Step {
             Self::Check { check } => check_seconds(*check),
             _ => {
                 let moves = if places.by_hand { f64::from(self.positions()) * HANDLING_S } else { 0.0 };
-                self.course(places).seconds() + moves
+                self.profile(places).seconds() + moves
             }
         }
     }
@@ -231,7 +231,7 @@ impl Step {
 
 struct Builder<'a> {
     places: &'a Places,
-    course: Course,
+    profile: StepProfile,
     level: f64,
 }
 
@@ -243,12 +243,12 @@ impl Builder<'_> {
     /// Goes to a level at a rate, share of the highest level per second, and waits there, s.
     fn set(&mut self, level: f64, rate: f64, seconds: f64) {
         self.level = level;
-        self.course.skip(Segment::Ramp { to: level, rate: rate * self.places.top });
-        self.course.skip(Segment::Hold { seconds });
+        self.profile.skip(Segment::Ramp { to: level, rate: rate * self.places.top });
+        self.profile.skip(Segment::Hold { seconds });
     }
 
     fn end(&mut self) {
-        self.course.skip(Segment::Vented { seconds: VENT_S });
+        self.profile.skip(Segment::Vented { seconds: VENT_S });
     }
 
     fn speed(&self, times: f64) -> f64 {
@@ -259,7 +259,7 @@ impl Builder<'_> {
         // An operator sets the stroke of a vented muscle: no force shows where it becomes free.
         let ends_by_force = to > 0.0 && !self.places.by_hand;
         let until_force = ends_by_force.then_some(self.places.free_force());
-        self.course.record(Segment::Travel { to, speed: self.speed(times), until_force });
+        self.profile.record(Segment::Travel { to, speed: self.speed(times), until_force });
     }
 
     fn go(&mut self, part: f64, times: f64) {
@@ -275,20 +275,20 @@ impl Builder<'_> {
 
     fn dwells(&mut self, seconds: f64) {
         self.go(0.5, 4.0);
-        self.course.record(Segment::Hold { seconds });
+        self.profile.record(Segment::Hold { seconds });
         self.go(0.9, 4.0);
         self.go(0.5, 4.0);
-        self.course.record(Segment::Hold { seconds });
+        self.profile.record(Segment::Hold { seconds });
         self.go(0.0, 4.0);
     }
 
     fn blocked_ramp(&mut self) {
         let top = self.places.top;
         let rate = FIRST_RAMP_SHARE * top;
-        self.course.record(Segment::Ramp { to: top, rate });
-        self.course.record(Segment::Hold { seconds: 2.0 });
-        self.course.record(Segment::Ramp { to: 0.0, rate });
-        self.course.record(Segment::Hold { seconds: 2.0 });
+        self.profile.record(Segment::Ramp { to: top, rate });
+        self.profile.record(Segment::Hold { seconds: 2.0 });
+        self.profile.record(Segment::Ramp { to: 0.0, rate });
+        self.profile.record(Segment::Hold { seconds: 2.0 });
     }
 
     fn ramps(&mut self, part: f64) {
@@ -298,8 +298,8 @@ impl Builder<'_> {
         let low = self.places.pressure_that_reaches(1.05 * stroke);
         self.travel(stroke, 4.0);
         for to in [low, top, low, top] {
-            self.course.record(Segment::Ramp { to, rate: SLOW_RAMP_SHARE * top });
-            self.course.record(Segment::Hold { seconds: 2.0 });
+            self.profile.record(Segment::Ramp { to, rate: SLOW_RAMP_SHARE * top });
+            self.profile.record(Segment::Hold { seconds: 2.0 });
         }
         self.travel(0.0, 4.0);
     }
@@ -316,8 +316,8 @@ impl Builder<'_> {
         let at = |i: i32| low + (top - low) * f64::from(i) / f64::from(stairs);
         let down_and_up = (0..stairs).rev().chain(1..=stairs);
         for to in down_and_up.map(at) {
-            self.course.record(Segment::Ramp { to, rate: RAMP_SHARE * top });
-            self.course.record(Segment::Hold { seconds });
+            self.profile.record(Segment::Ramp { to, rate: RAMP_SHARE * top });
+            self.profile.record(Segment::Hold { seconds });
         }
         if stroke > 0.0 {
             self.travel(0.0, 4.0);

@@ -8,12 +8,12 @@ use pam_device::{Address, Port};
 
 /// Moves the free end.
 pub trait StrokeAxis {
-    /// Whether it moves while a course runs.
+    /// Whether it moves while a profile runs.
     fn moves(&self) -> bool {
         false
     }
 
-    /// Before a course that holds a stroke (m), the muscle being vented; false where the operator ends the campaign instead.
+    /// Before a profile that holds a stroke (m), the muscle being vented; false where the operator ends the campaign instead.
     ///
     /// # Errors
     /// An axis that does not answer.
@@ -37,7 +37,7 @@ pub trait StrokeAxis {
         Ok(())
     }
 
-    /// Returns to rest length after a course, the muscle being vented.
+    /// Returns to rest length after a profile, the muscle being vented.
     ///
     /// # Errors
     /// As [`Self::prepare`].
@@ -55,7 +55,7 @@ pub struct NoAxis;
 
 impl StrokeAxis for NoAxis {}
 
-/// Speed at which an axis returns after a course that did not end itself, m/s.
+/// Speed at which an axis returns after a profile that did not end itself, m/s.
 const RETURN_SPEED: f64 = 2e-3;
 
 #[cfg(feature = "emulated")]

@@ -46,9 +46,9 @@ fn run() -> pam_data::error::Result<()> {
     if motion {
         let start = Instant::now();
         let motions = Motion::of_campaign(&campaign);
-        let turns: usize = motions.iter().map(|m| m.turns.len()).sum();
+        let reversals: usize = motions.iter().map(|m| m.reversals.len()).sum();
         let holds: usize = motions.iter().map(|m| m.holds.len()).sum();
-        println!("{turns} turns and {holds} holds, found in {:.3} s", start.elapsed().as_secs_f64());
+        println!("{reversals} reversals and {holds} holds, found in {:.3} s", start.elapsed().as_secs_f64());
     }
     Ok(())
 }

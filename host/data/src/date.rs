@@ -34,7 +34,7 @@ pub fn of_recording(path: &Path, first: Option<f64>) -> Option<(f64, DateSource)
         return Some((date, DateSource::Name));
     }
     let clock = first.filter(|t| *t > YEAR_2000 && *t < YEAR_2100);
-    if let Some(date) = clock.or_else(|| in_head(path)) {
+    if let Some(date) = clock.or_else(|| in_header(path)) {
         return Some((date, DateSource::Column));
     }
     let modified = std::fs::metadata(path).and_then(|m| m.modified()).ok()?;
@@ -46,7 +46,7 @@ const YEAR_2000: f64 = 946_684_800.0;
 /// s since 1970 of the year 2100.
 const YEAR_2100: f64 = 4_102_444_800.0;
 /// Bytes of a text file in which a date is looked for.
-const HEAD: usize = 4096;
+const HEADER_BYTES: usize = 4096;
 /// Names of columns that hold a date as text.
 const DATE_COLUMNS: [&str; 6] = ["date", "datetime", "date_time", "timestamp", "recorded", "started"];
 
@@ -259,11 +259,11 @@ fn seconds_since_1970(year: u64, month: u64, day: u64) -> u64 {
 }
 
 /// A date in a remark above the header, or in the first row of a column that is named for it.
-fn in_head(path: &Path) -> Option<f64> {
+fn in_header(path: &Path) -> Option<f64> {
     use std::io::Read;
-    let mut head = Vec::new();
-    std::fs::File::open(path).ok()?.take(HEAD as u64).read_to_end(&mut head).ok()?;
-    let text = String::from_utf8_lossy(&head);
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).ok()?.take(HEADER_BYTES as u64).read_to_end(&mut bytes).ok()?;
+    let text = String::from_utf8_lossy(&bytes);
     let mut columns: Option<Vec<usize>> = None;
     for line in text.lines() {
         if line.starts_with('#') {
@@ -276,8 +276,8 @@ fn in_head(path: &Path) -> Option<f64> {
         if let Some(dated) = &columns {
             return dated.iter().find_map(|i| in_text(cells.get(*i)?));
         }
-        let named = |c: &str| DATE_COLUMNS.contains(&c.to_lowercase().as_str());
-        columns = Some((0..cells.len()).filter(|i| named(cells[*i])).collect());
+        let is_date_column = |c: &str| DATE_COLUMNS.contains(&c.to_lowercase().as_str());
+        columns = Some((0..cells.len()).filter(|i| is_date_column(cells[*i])).collect());
     }
     None
 }

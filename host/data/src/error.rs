@@ -271,7 +271,7 @@ impl Error {
     pub fn unreadable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
         let file = file.as_ref();
         let error =
-            Self::new(DataCode::FileUnreadable, format!("cannot be read: {}", in_words(reason))).file(file);
+            Self::new(DataCode::FileUnreadable, format!("cannot be read: {}", plain_text(reason))).file(file);
         match reason.kind() {
             std::io::ErrorKind::NotFound if file.to_string_lossy().contains(['*', '?']) => {
                 error.help("no file here matches this pattern")
@@ -283,7 +283,7 @@ impl Error {
 
     /// The file could not be written; the operating system's reason becomes part of the cause.
     pub fn unwritable(file: impl AsRef<Path>, reason: &std::io::Error) -> Self {
-        Self::new(DataCode::FileUnwritable, format!("cannot be written: {}", in_words(reason))).file(file)
+        Self::new(DataCode::FileUnwritable, format!("cannot be written: {}", plain_text(reason))).file(file)
     }
 
     /// Names the file. A file already named stays: the innermost place is the exact one.
@@ -375,7 +375,7 @@ impl Error {
 }
 
 /// The operating system's reason without its number, which repeats the text.
-fn in_words(reason: &std::io::Error) -> String {
+fn plain_text(reason: &std::io::Error) -> String {
     let text = reason.to_string();
     match text.rfind(" (os error ") {
         Some(at) => text[..at].to_owned(),

@@ -8,7 +8,7 @@ use std::io::{self, Read};
 /// The first eight bytes, and the last.
 pub const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 /// Bytes before a record's body.
-pub const HEAD: usize = 9;
+pub const RECORD_HEADER: usize = 9;
 /// Largest chunk or message that is taken into memory. A tenth of a second of telemetry takes 32 KiB; other writers' chunks take
 /// some MiB.
 pub const LARGEST: u64 = 64 << 20;
@@ -117,7 +117,7 @@ impl<'a> Chunk<'a> {
         std::iter::from_fn(move || {
             let (kind, length) = header(rest)?;
             let length = usize::try_from(length).ok()?;
-            let (body, after) = rest.get(HEAD..)?.split_at_checked(length)?;
+            let (body, after) = rest.get(RECORD_HEADER..)?.split_at_checked(length)?;
             rest = after;
             Some((kind, body))
         })
@@ -264,7 +264,7 @@ impl<R: Read> Records<R> {
             }
         }
         loop {
-            let mut bytes = [0; HEAD];
+            let mut bytes = [0; RECORD_HEADER];
             self.reader.read_exact(&mut bytes).map_err(read_failure)?;
             let (kind, length) = header(&bytes).ok_or(Trouble::Cut)?;
             let mut body = (&mut self.reader).take(length);

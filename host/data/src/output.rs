@@ -1,6 +1,6 @@
 //! Files that appear whole or not at all.
 
-mod turn;
+mod folder_lock;
 
 use std::ffi::OsString;
 use std::fs;
@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
 
-pub use self::turn::Turn;
+pub use self::folder_lock::FolderLock;
 
 /// Writes a file that appears at `path` whole: a reader sees the old file or the new one, and a program that is stopped leaves the old
 /// one and nothing else. A new file that takes an old one's place has its permissions. A path of `-` is standard output.

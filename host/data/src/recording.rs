@@ -55,6 +55,6 @@ pub use header::has_decimal_commas;
 pub use import::{Import, Missing};
 pub use mountings::{Preceding, Rest, SAME_LENGTH, VENTING};
 pub use noise::{resolution, white_noise};
-pub use quantity::{Named, Quantity, Unit, named};
+pub use quantity::{HeaderName, Quantity, Unit, parse_header};
 pub use read::{Hashes, Reader};
 pub use spikes::usual_change;

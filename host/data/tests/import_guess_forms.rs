@@ -133,9 +133,9 @@ fn older_programs_of_windows_write_signs_in_latin_1() {
 fn the_first_sign_of_a_unit_is_never_left_out() {
     let rows = stroke(|[t, p, x, f]| format!("{:.0},{p},{x:.3},{f:.3}", 1e6 * t));
     for sign in [&b"\xb5"[..], "\u{fffd}".as_bytes(), "µ".as_bytes()] {
-        let head = [b"Time (", sign, b"s),Pressure (kPa),Displacement (mm),Force (N)\n"].concat();
+        let header = [b"Time (", sign, b"s),Pressure (kPa),Displacement (mm),Force (N)\n"].concat();
         let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
-        std::fs::write(file.path(), [&head[..], rows.as_bytes()].concat()).unwrap();
+        std::fs::write(file.path(), [&header[..], rows.as_bytes()].concat()).unwrap();
         let error = Reader::new().file(file.path()).unwrap_err();
         assert!(error.to_string().contains("unknown unit"), "{error}");
     }
@@ -143,10 +143,10 @@ fn the_first_sign_of_a_unit_is_never_left_out() {
 
 #[test]
 fn loggers_of_labview_write_a_name_more_than_cells_and_units_above() {
-    let head = "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\t\t\t\t\nChannels\t3\t\t\t\nY_Unit_Label\tbar\tmm\tN\t\n\
+    let header = "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\t\t\t\t\nChannels\t3\t\t\t\nY_Unit_Label\tbar\tmm\tN\t\n\
                 X_Dimension\tTime\tTime\tTime\t\nX0\t0.0\t0.0\t0.0\t\n***End_of_Header***\t\t\t\t\nX_Value\tPressure\tStroke\tForce\tComment\n";
     let rows = stroke(|[t, p, x, f]| format!("{t:.2}\t{}\t{x:.3}\t{f:.3}", p / 100.0));
-    let (guess, recordings) = read(&[("a_2bar.lvm", format!("{head}{rows}").into())]);
+    let (guess, recordings) = read(&[("a_2bar.lvm", format!("{header}{rows}").into())]);
     let recording = &recordings.unwrap_or_else(|e| panic!("{} {e}", guess.description))[0];
     assert_eq!((recording.pressure[0], recording.len()), (300e3, 40), "{}", guess.description);
     assert!((recording.time[39] - 1.95).abs() < 1e-9 && (recording.stroke[20] - 4e-3).abs() < 1e-9);
@@ -235,12 +235,12 @@ fn of_two_pressures_the_one_that_differs_between_files_is_the_muscles() {
 #[test]
 fn missing_data_are_reported_with_the_right_remedy() {
     let unknown = |text: String| read(&[("a_300kPa.csv", text.into())]).0.all_unknown();
-    let head = "time_s,pressure_kPa,displacement_mm,force_N\n";
+    let header = "time_s,pressure_kPa,displacement_mm,force_N\n";
     // Two sensors in rows of their own: leaving out incomplete rows leaves none.
     let rows = stroke(|[t, p, x, f]| format!("{t:.2},{p},,\n{:.2},,{x:.3},{f:.3}", t + 0.02));
-    assert!(unknown(format!("{head}{rows}")).contains("no row has a number in every column"));
+    assert!(unknown(format!("{header}{rows}")).contains("no row has a number in every column"));
     let rows = stroke(|[t, p, x, f]| format!("{:.0},{p},{x:.3},{f:.3}", t.floor()));
-    assert!(unknown(format!("{head}{rows}")).contains("coarser than the rows"));
+    assert!(unknown(format!("{header}{rows}")).contains("coarser than the rows"));
     let rows = stroke(|[t, p, x, f]| {
         format!("{},{p},{x:.3},{f:.3}", (4_294_000_000 + (t * 1e6) as u64) % (1 << 32))
     });

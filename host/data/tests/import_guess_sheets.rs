@@ -283,12 +283,12 @@ fn remarks_among_the_rows_are_left_out() {
 fn names_that_stand_again_in_the_middle_are_left_out() {
     let run = |begin, kpa| lines(&rows(begin, kpa), plain);
     let units = "time,pressure,displacement,force\ns,kPa,mm,N\n";
-    for head in [HEADER, units, "Bench 3\ntime_s,pressure_kPa,displacement_mm,force_N\n"] {
-        let (guess, read) = recordings(&format!("{head}{}{head}{}", run(0.0, 300.0), run(2.0, 300.0)));
-        assert_eq!(lengths(&read), [80], "{head} {}", guess.description);
+    for header in [HEADER, units, "Bench 3\ntime_s,pressure_kPa,displacement_mm,force_N\n"] {
+        let (guess, read) = recordings(&format!("{header}{}{header}{}", run(0.0, 300.0), run(2.0, 300.0)));
+        assert_eq!(lengths(&read), [80], "{header} {}", guess.description);
         assert!(guess.checks.iter().any(|c| c.text().contains("repeated")), "{:?}", guess.checks);
-        let (guess, read) = recordings(&format!("{head}{}\n{head}{}", run(0.0, 300.0), run(0.0, 500.0)));
-        assert_eq!(lengths(&read), [40, 40], "{head} {}", guess.description);
+        let (guess, read) = recordings(&format!("{header}{}\n{header}{}", run(0.0, 300.0), run(0.0, 500.0)));
+        assert_eq!(lengths(&read), [40, 40], "{header} {}", guess.description);
         same(&read[1], 500.0);
     }
     let other = "time_s,pressure_kPa,force_N,displacement_mm\n";
@@ -303,14 +303,14 @@ fn names_that_stand_again_in_the_middle_are_left_out() {
 fn units_below_and_above_the_names_are_read() {
     let text = lines(&rows(0.0, 300.0), |[t, p, x, f]| format!("{},{},{},{f}", 1e3 * t, p / 100.0, x / 10.0));
     let names = "time,pressure,displacement,force\n";
-    for head in [
+    for header in [
         format!("{names}ms,bar,cm,N\n"),
         format!("{names}(ms),(bar),(cm),(N)\n"),
         format!("{names}[ms],[bar],[cm],[N]\n\n"),
         format!("{names}ai0,ai1,ai2,ai3\nms,bar,cm,N\n"),
         format!("ms,bar,cm,N\n{names}"),
     ] {
-        let (_, read) = recordings(&format!("{head}{text}"));
+        let (_, read) = recordings(&format!("{header}{text}"));
         same(&read[0], 300.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Why a setpoint could not be reached, and how long a run was outside the tested range of its table.
 
-use model_core::inverse::Reach;
+use model_core::inverse::Attainability;
 use model_core::link::messages::{Side, State, Telemetry};
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
@@ -167,11 +167,11 @@ impl Reachability {
             let force = Force::from_newtons(sample.setpoint);
             let found = self.muscle.pressure_for(force, &held, 0.0, self.guess, &self.muscle.search());
             self.guess = found.pressure;
-            match found.reach {
-                Reach::Reached => {}
-                Reach::BeyondBlockedForce => self.beyond_blocked_force += 1,
-                Reach::BelowDeadband => self.below_deadband += 1,
-                Reach::NotRising => self.not_rising += 1,
+            match found.attainability {
+                Attainability::Attainable => {}
+                Attainability::BeyondBlockedForce => self.beyond_blocked_force += 1,
+                Attainability::BelowDeadband => self.below_deadband += 1,
+                Attainability::NotRising => self.not_rising += 1,
             }
         }
     }
@@ -199,8 +199,8 @@ impl Reachability {
             (self.below_deadband, "less than it pulls there without pressure"),
             (self.not_rising, "at a stroke where more pressure pulls no harder"),
         ];
-        let (samples, words) = reasons.into_iter().max_by_key(|reason| reason.0)?;
-        (samples > 0).then_some(words)
+        let (samples, reason) = reasons.into_iter().max_by_key(|reason| reason.0)?;
+        (samples > 0).then_some(reason)
     }
 
     /// The warning for a run that spent more than a tenth of its time outside the tested range of the table.
@@ -243,34 +243,34 @@ mod tests {
 
     #[test]
     fn unreachable_setpoints_are_found_before_the_muscle_moves() {
-        let reach = of_example();
+        let reachability = of_example();
         let constant = |value| SetpointProfile::Constant(value);
-        let said = reach.beyond(Quantity::Pressure, &constant(9000e3)).expect("beyond");
+        let said = reachability.beyond(Quantity::Pressure, &constant(9000e3)).expect("beyond");
         assert!(said.contains("9000 kPa") && said.contains("600 kPa"), "{said}");
-        let said = reach.beyond(Quantity::Force, &constant(500.0)).expect("beyond");
+        let said = reachability.beyond(Quantity::Force, &constant(500.0)).expect("beyond");
         assert!(said.starts_with("the setpoint reaches 500 N, and the muscle pulls at most 1"), "{said}");
         let sine =
             SetpointProfile::Wave(Reference::Sine { mean: 100.0, amplitude: 150.0, frequency_hz: 1.0 });
-        assert!(reach.beyond(Quantity::Force, &sine).is_some());
-        assert_eq!(reach.beyond(Quantity::Force, &constant(100.0)), None);
-        assert_eq!(reach.beyond(Quantity::Pressure, &constant(600e3)), None);
-        let said = reach.beyond(Quantity::Pressure, &constant(-20e3)).expect("below");
+        assert!(reachability.beyond(Quantity::Force, &sine).is_some());
+        assert_eq!(reachability.beyond(Quantity::Force, &constant(100.0)), None);
+        assert_eq!(reachability.beyond(Quantity::Pressure, &constant(600e3)), None);
+        let said = reachability.beyond(Quantity::Pressure, &constant(-20e3)).expect("below");
         assert!(said.contains("-20 kPa"), "{said}");
-        assert!(reach.beyond(Quantity::Force, &constant(-1.0)).is_some());
+        assert!(reachability.beyond(Quantity::Force, &constant(-1.0)).is_some());
     }
 
     #[test]
     fn a_stroke_longer_than_the_free_one_is_known_before_the_muscle_moves() {
-        let reach = of_example();
+        let reachability = of_example();
         let constant = |metres| SetpointProfile::Constant(metres);
-        let free = reach.free_stroke();
-        let held = reach.muscle.at_stroke(Length::from_metres(free));
-        let force = reach.muscle.parts(&held, reach.table.max_pressure).quasi();
+        let free = reachability.free_stroke();
+        let held = reachability.muscle.at_stroke(Length::from_metres(free));
+        let force = reachability.muscle.parts(&held, reachability.table.max_pressure).quasi();
         assert!(force.abs() < 0.1, "{force} N at the free stroke {free} m");
-        assert_eq!(reach.beyond(Quantity::Stroke, &constant(0.9 * free)), None);
-        let said = reach.beyond(Quantity::Stroke, &constant(1.2 * free)).expect("beyond");
+        assert_eq!(reachability.beyond(Quantity::Stroke, &constant(0.9 * free)), None);
+        let said = reachability.beyond(Quantity::Stroke, &constant(1.2 * free)).expect("beyond");
         assert!(said.contains("shortens by at most"), "{said}");
-        let said = reach.beyond(Quantity::Stroke, &constant(-0.005)).expect("longer");
+        let said = reachability.beyond(Quantity::Stroke, &constant(-0.005)).expect("longer");
         assert!(said.contains("-5.0 mm"), "{said}");
     }
 }

@@ -186,7 +186,7 @@ fn follow(
     client.call::<StartMode>(&Start { mode: plan.quantity.mode(), session: client.session() })?;
     let mut steps = Steps::begin(client, plan)?;
     let mut begun = None;
-    let mut heard = Instant::now();
+    let mut last_received = Instant::now();
     loop {
         if stop() {
             return Ok(Ending::Stopped);
@@ -194,11 +194,11 @@ fn follow(
         client.keep_alive()?;
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(s)) => {
-                heard = Instant::now();
+                last_received = Instant::now();
                 // Samples from before the start may still be on the line, those of an earlier run too.
                 let early = s.state != State::Running || s.time_us <= status.time_us;
                 if early && begun.is_none() {
-                    stream.hears();
+                    stream.mark_alive();
                     continue;
                 }
                 let start = *begun.get_or_insert(s.time_us);
@@ -224,7 +224,7 @@ fn follow(
                 return Err(messages::stopped(&report));
             }
             Some(Topic::Event(_) | Topic::Log(_)) => {}
-            None if heard.elapsed() > silence => {
+            None if last_received.elapsed() > silence => {
                 let status = client.call::<GetStatus>(&())?;
                 if status.state == State::Fault {
                     return Err(fault(client)?);

@@ -114,17 +114,17 @@ fn wrong(cause: impl Into<String>) -> Error {
 }
 
 /// `name=value` parts of a profile.
-struct Words<'a> {
+struct Arguments<'a> {
     kind: &'a str,
-    named: Vec<(&'a str, f64)>,
-    bare: Vec<f64>,
+    keyed: Vec<(&'a str, f64)>,
+    positional: Vec<f64>,
 }
 
-impl<'a> Words<'a> {
+impl<'a> Arguments<'a> {
     fn read(text: &'a str) -> Result<Self> {
         let mut words = text.split_whitespace();
         let kind = words.next().unwrap_or_default();
-        let (mut named, mut bare) = (Vec::new(), Vec::new());
+        let (mut keyed, mut positional) = (Vec::new(), Vec::new());
         for word in words {
             let (name, number) = word.split_once('=').map_or((None, word), |(n, v)| (Some(n), v));
             let value: f64 = number
@@ -133,16 +133,16 @@ impl<'a> Words<'a> {
                 .filter(|v: &f64| v.is_finite())
                 .ok_or_else(|| wrong("not a number").value(word))?;
             match name {
-                Some(name) => named.push((name, value)),
-                None => bare.push(value),
+                Some(name) => keyed.push((name, value)),
+                None => positional.push(value),
             }
         }
-        Ok(Self { kind, named, bare })
+        Ok(Self { kind, keyed, positional })
     }
 
     /// The values of exactly these names.
     fn take<const N: usize>(&self, names: [&str; N]) -> Result<[f64; N]> {
-        for (name, _) in &self.named {
+        for (name, _) in &self.keyed {
             if !names.contains(name) {
                 let near = nearest(name, names).map(|n| format!("; did you mean {n}=?")).unwrap_or_default();
                 return Err(wrong(format!("{} knows no {name}={near}", self.kind)));
@@ -150,7 +150,7 @@ impl<'a> Words<'a> {
         }
         let mut out = [0.0; N];
         for (to, name) in out.iter_mut().zip(names) {
-            let mut found = self.named.iter().filter(|(n, _)| *n == name);
+            let mut found = self.keyed.iter().filter(|(n, _)| *n == name);
             *to = found.next().ok_or_else(|| wrong(format!("{} needs {name}=", self.kind)))?.1;
             if found.next().is_some() {
                 return Err(wrong(format!("{name}= is given twice")));
@@ -196,20 +196,20 @@ impl SetpointProfile {
                 Err(wrong("not a number").value(text))
             };
         }
-        let words = Words::read(text)?;
-        if words.kind != "steps" && words.kind != "constant" && !words.bare.is_empty() {
-            return Err(wrong(format!("{} takes name=value only", words.kind)).value(text));
+        let arguments = Arguments::read(text)?;
+        if arguments.kind != "steps" && arguments.kind != "constant" && !arguments.positional.is_empty() {
+            return Err(wrong(format!("{} takes name=value only", arguments.kind)).value(text));
         }
         let positive = |name: &str, value: f64| {
             if value > 0.0 { Ok(value) } else { Err(wrong(format!("{name}= must be above zero"))) }
         };
-        match words.kind {
-            "constant" => match words.bare[..] {
+        match arguments.kind {
+            "constant" => match arguments.positional[..] {
                 [value] => Ok(Self::Constant(si(value))),
                 _ => Err(wrong("constant takes one value")),
             },
             "sine" => {
-                let [mean, amplitude, frequency] = words.take(["mean", "amplitude", "frequency"])?;
+                let [mean, amplitude, frequency] = arguments.take(["mean", "amplitude", "frequency"])?;
                 Ok(Self::Wave(Reference::Sine {
                     mean: si(mean),
                     amplitude: si(amplitude),
@@ -217,17 +217,17 @@ impl SetpointProfile {
                 }))
             }
             "steps" => {
-                let [hold] = words.take(["hold"])?;
-                if words.bare.is_empty() {
+                let [hold] = arguments.take(["hold"])?;
+                if arguments.positional.is_empty() {
                     return Err(wrong("steps needs at least one value"));
                 }
                 Ok(Self::Steps {
-                    values: words.bare.iter().map(|v| si(*v)).collect(),
+                    values: arguments.positional.iter().map(|v| si(*v)).collect(),
                     hold_s: positive("hold", hold)?,
                 })
             }
             "trapezoid" => {
-                let [low, high, ramp, hold] = words.take(["low", "high", "ramp", "hold"])?;
+                let [low, high, ramp, hold] = arguments.take(["low", "high", "ramp", "hold"])?;
                 Ok(Self::Wave(Reference::Trapezoid {
                     low: si(low),
                     high: si(high),
@@ -237,7 +237,7 @@ impl SetpointProfile {
             }
             "chirp" => {
                 let [mean, amplitude, from, to, duration] =
-                    words.take(["mean", "amplitude", "from", "to", "duration"])?;
+                    arguments.take(["mean", "amplitude", "from", "to", "duration"])?;
                 Ok(Self::Wave(Reference::Chirp {
                     mean: si(mean),
                     amplitude: si(amplitude),

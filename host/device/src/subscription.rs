@@ -14,7 +14,7 @@ use pam_data::error::Result;
 /// How long to listen for a stream that is there already: one of 8 Hz is found.
 const LISTEN: Duration = Duration::from_millis(250);
 /// Silence after which the stream is requested again: another program may have ended it.
-const AGAIN: Duration = Duration::from_millis(500);
+const RENEW_AFTER: Duration = Duration::from_millis(500);
 /// Periods of the stream that count as silence where they last longer.
 const PERIODS: u32 = 3;
 /// A tick of the controller.
@@ -63,7 +63,7 @@ impl Subscription {
     }
 
     /// Notes that the stream is alive, for a sample that is of no use.
-    pub(crate) fn hears(&mut self) {
+    pub(crate) fn mark_alive(&mut self) {
         self.last_message = Instant::now();
     }
 
@@ -94,7 +94,7 @@ impl Subscription {
     /// # Errors
     /// What the device refuses, or silence.
     pub fn renew(&mut self, client: &mut Client) -> Result<()> {
-        let patience = self.silence(AGAIN);
+        let patience = self.silence(RENEW_AFTER);
         if self.last_message.elapsed() > patience && self.requested.elapsed() > patience {
             self.requested = Instant::now();
             // Who had requested it before has ended it.

@@ -50,10 +50,10 @@ impl VentLine {
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let deadline = Instant::now() + OTHER_WRITER;
-        let _turn = loop {
+        let _guard = loop {
             match self.writing.try_lock() {
-                Ok(turn) => break Some(turn),
-                Err(TryLockError::Poisoned(turn)) => break Some(turn.into_inner()),
+                Ok(guard) => break Some(guard),
+                Err(TryLockError::Poisoned(poisoned)) => break Some(poisoned.into_inner()),
                 Err(TryLockError::WouldBlock) if Instant::now() < deadline => {
                     std::thread::sleep(Duration::from_millis(1));
                 }

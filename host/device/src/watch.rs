@@ -53,12 +53,12 @@ fn follow(
     // Samples that an earlier run left on the line have another rate.
     let begun = client.call::<GetStatus>(&())?.time_us;
     let (mut first, mut last) = (None, 0);
-    let mut heard = Instant::now();
+    let mut last_received = Instant::now();
     while !stop() {
         match client.topic(Duration::from_millis(50))? {
             Some(Topic::Telemetry(sample)) if first.is_none() && sample.time_us < begun => {}
             Some(Topic::Telemetry(sample)) => {
-                heard = Instant::now();
+                last_received = Instant::now();
                 if sample.time_us < last {
                     return Err(Error::new(
                         DeviceCode::DeviceSilent,
@@ -77,7 +77,7 @@ fn follow(
             }
             Some(Topic::Event(event)) => take(Happened::Event(&event))?,
             Some(Topic::Log(_)) => {}
-            None if heard.elapsed() > silence => {
+            None if last_received.elapsed() > silence => {
                 let status = client.call::<GetStatus>(&())?;
                 return Err(Error::new(
                     DeviceCode::DeviceSilent,

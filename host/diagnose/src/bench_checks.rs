@@ -92,7 +92,7 @@ impl Fault {
 
     /// The check, and the value with its interval.
     fn source(&self) -> (String, String) {
-        (self.measured.check.to_string(), self.measured.words.clone())
+        (self.measured.check.to_string(), self.measured.text.clone())
     }
 
     fn remark(&self) -> Remark {

@@ -46,7 +46,7 @@ fn stride(rows: &Rows) -> usize {
 pub(super) fn downsample(rows: &Rows, traces: &[Vec<f64>]) -> (Rows, Vec<Vec<f64>>) {
     let stride = stride(rows);
     let pick = |v: &Vec<f64>| v.iter().step_by(stride).copied().collect::<Vec<f64>>();
-    (rows.thinned(stride), traces.iter().map(pick).collect())
+    (rows.downsampled(stride), traces.iter().map(pick).collect())
 }
 
 /// Rows within the model's claim: all that count, and those about a reversal, which are masked for their direction alone. Slack rows and
@@ -229,24 +229,27 @@ impl HeldOutRows {
             Kind::Soft(prior) if prior.elastic > ONE_BLADDER * strongest(rows) => Kind::Flexible(TABLE_ORDER),
             Kind::Soft(_) | Kind::Stiff => Kind::Stiff,
         };
-        let (thin, traces) = downsample(rows, traces);
-        let shows = |t: &Vec<f64>| t.iter().zip(&thin.vented).any(|(force, vented)| *vented && *force != 0.0);
+        let (downsampled, traces) = downsample(rows, traces);
+        let shows =
+            |t: &Vec<f64>| t.iter().zip(&downsampled.vented).any(|(force, vented)| *vented && *force != 0.0);
         let tares = traces.iter().any(shows);
-        let mut split = strictest(&thin, kind);
-        if !thin.isometric && split.groups.len() > 1 && seen_once(&thin, kind, &traces, &split) {
+        let mut split = strictest(&downsampled, kind);
+        if !downsampled.isometric && split.groups.len() > 1 && seen_once(&downsampled, kind, &traces, &split)
+        {
             // What only the first stroke of a virgin muscle shows cannot be predicted from another stroke.
-            let strokes = strokes(&thin);
+            let strokes = strokes(&downsampled);
             let part = (strokes.end() - strokes.start()) / STROKE_PARTS;
-            let of =
-                |i: usize| ((thin.contexts()[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS;
-            split = self::split(Split::StrokeParts, &thin, &of);
+            let of = |i: usize| {
+                ((downsampled.contexts()[i].stroke - strokes.start()) / part).max(0.0) as u32 % FOLDS
+            };
+            split = self::split(Split::StrokeParts, &downsampled, &of);
         }
-        let lengths = thin.isometric.then(|| {
-            let length = units(&thin, &split);
-            self::split(Split::Recordings, &thin, &|i| length[i])
+        let lengths = downsampled.isometric.then(|| {
+            let length = units(&downsampled, &split);
+            self::split(Split::Recordings, &downsampled, &|i| length[i])
         });
         let lengths = lengths.filter(|l| l.groups.len() >= FEWEST_LENGTHS_HELD_OUT);
-        Self { rows: thin, stride: stride(rows), kind, split, tares, lengths }
+        Self { rows: downsampled, stride: stride(rows), kind, split, tares, lengths }
     }
 
     /// Squared errors on rows that were left out, with effects of these traces, by independent unit; where nothing can be left out, on all.
@@ -323,7 +326,7 @@ mod tests {
     use crate::rows::prepare;
     use crate::tests::{geometry, muscle};
 
-    /// Pressure cycles at five held lengths, long enough that rows are thinned.
+    /// Pressure cycles at five held lengths, long enough that rows are downsampled.
     fn isometric() -> Campaign {
         let muscle = muscle();
         let n = 3 * HELD_OUT_ROWS / 5;

@@ -41,7 +41,9 @@ pub fn diagnose_described(
         } else if let Ok(plain) = plain {
             options.progress.stage("comparing with other dimensions of the muscle", 0);
             let other = dimensions(campaign, muscle, options, &diagnosis, plain);
-            diagnosis.remarks.extend(other.map(Remark::Dimensions));
+            if let Some(other) = other {
+                diagnosis.remarks.insert(0, Remark::Dimensions(other));
+            }
         }
     }
     if let Ok(plain) = plain {
@@ -82,6 +84,8 @@ fn refuse(diagnosis: &mut Diagnosis, why: String) {
     diagnosis.remarks.insert(0, Remark::NotJudged(reason.clone()));
     diagnosis.outcome = Outcome::NotJudged(reason);
     diagnosis.missing.clear();
+    diagnosis.r#where.clear();
+    diagnosis.profiles.clear();
     diagnosis.next_experiment = None;
     for considered in &mut diagnosis.considered {
         considered.why_not = WhyNot::NotJudged;

@@ -71,7 +71,7 @@ mod tests {
     use crate::tests::{geometry, loops, recorded};
 
     /// Share of the campaign that is over at each row.
-    fn course(rows: &Rows) -> Vec<f64> {
+    fn elapsed_share(rows: &Rows) -> Vec<f64> {
         let end = rows.contexts().last().map_or(1.0, |c| c.time);
         rows.contexts().iter().map(|c| c.time / end).collect()
     }
@@ -87,7 +87,7 @@ mod tests {
         }
         let (rows, _) = prepare(&campaign, &geometry().build().expect("a braid")).expect("rows");
         let rows = baselines::linearised(&rows, &baselines::fit(&rows, Kind::Stiff, &[]));
-        let softening = course(&rows).iter().zip(&rows.force).map(|(t, f)| -t * f).collect();
+        let softening = elapsed_share(&rows).iter().zip(&rows.force).map(|(t, f)| -t * f).collect();
         fall_beside_free_zero(&rows, Kind::Stiff, &[softening], 200.0, typical_step(&rows))
     }
 

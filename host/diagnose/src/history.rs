@@ -14,34 +14,34 @@
 //! | [`table_unseen`] | each run predicted from the others by tables |
 //! | `unseen` | each run predicted from the others; jackknife over runs |
 //! | `run_offset` | slips and bad runs |
-//! | `beside` | which effect unseen runs need beside the memory |
+//! | `additional_effect` | which effect unseen runs need beside the memory |
 //! | `friction` | dry friction beside the memory, and in place of its fast part |
-//! | `late` | readings that come late |
-//! | `gap` | the gap between filling and emptying, and its cause |
+//! | `sensor_dynamics` | lag, delay, and filter of a sensor |
+//! | `hysteresis` | the gap between filling and emptying, and its cause |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
 //! | `slack_reading` | what the load cell reads of a slack muscle |
 //! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
-//! | `enter`, `entries` | the history beside what the static search says, and its entries in the answer |
+//! | `memory_removal`, `entries` | the history beside what the static search says, and its entries in the answer |
 //! | [`crate::criteria`] | every constant |
 
 pub mod answer;
 
-mod beside;
+mod additional_effect;
 mod campaign;
-mod enter;
 mod entries;
 mod findings;
 mod friction;
-mod gap;
 mod held_table;
+mod hysteresis;
 mod judge;
-mod late;
 mod law;
 mod memory;
+mod memory_removal;
 mod places;
 mod run_offset;
+mod sensor_dynamics;
 mod shift_fit;
 mod slack_reading;
 mod spline;
@@ -53,14 +53,14 @@ mod tests;
 mod unseen;
 
 pub use answer::History;
-pub use enter::diagnose;
-pub(crate) use enter::reliable_recordings;
 pub use entries::is_from_history;
+pub use memory_removal::diagnose;
+pub(crate) use memory_removal::reliable_recordings;
 
 use model_core::braid::Geometry;
 use pam_data::recording::Campaign;
 
-use self::beside::{Column, Needed};
+use self::additional_effect::{AdditionalEffect, Column};
 use self::campaign::Points;
 use self::criteria::{MEMORY_SINGLE_TIMES, TIMES};
 use self::friction::Instead;
@@ -82,7 +82,7 @@ pub(super) struct Found {
     /// The largest force that the memory makes, N.
     pub peak: f64,
     /// The effect that unseen runs need beside the memory.
-    needed: Option<Needed>,
+    needed: Option<AdditionalEffect>,
     /// What the load cell reads of a slack muscle.
     slack_reading: Option<SlackReading>,
 }
@@ -103,7 +103,7 @@ struct Fits<'a> {
     with_slips: Option<(Law, Unseen)>,
     /// Unseen errors with the slips alone.
     slips_alone: Option<Unseen>,
-    needed: Option<Needed>,
+    needed: Option<AdditionalEffect>,
     instead: Instead,
     slack_reading: Option<SlackReading>,
     /// Unseen error of the best law with one time constant over that of the spectrum, rms.
@@ -175,9 +175,9 @@ fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
     let drive = directions.first();
     let instead = drive.map(|d| friction::instead(&layer, (reported, seen), &steps, d)).unwrap_or_default();
     let laws = directions.iter_mut().flat_map(|d| std::mem::take(&mut d.laws));
-    let columns: Vec<Column> = laws.chain(late::columns(points)).collect();
+    let columns: Vec<Column> = laws.chain(sensor_dynamics::columns(points)).collect();
     let base: Vec<Vec<f64>> = directions.into_iter().map(|d| d.base).collect();
-    let needed = beside::needed(&layer, (reported, seen), &steps, &base, &columns, &areas);
+    let needed = additional_effect::needed(&layer, (reported, seen), &steps, &base, &columns, &areas);
     let single = single_time(points, &law, &memory);
     Fits {
         by_direction: unseen::static_curves(points, true),

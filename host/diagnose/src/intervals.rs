@@ -149,19 +149,19 @@ fn by_strokes(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<O
 fn by_groups(selection: &Selection, tangents: &[Tangent], rows: &Rows) -> Vec<f64> {
     let mut columns: Vec<Vec<f64>> = tangents.iter().map(|t| t.column.clone()).collect();
     columns.extend(selection.traces.iter().cloned());
-    let (thin, mut columns) = downsample(rows, &columns);
+    let (downsampled, mut columns) = downsample(rows, &columns);
     // The remaining distance to the tangents is the error of the estimate.
-    let mut force = thin.force.clone();
+    let mut force = downsampled.force.clone();
     for trace in columns.split_off(tangents.len()) {
         force.iter_mut().zip(&trace).for_each(|(f, t)| *f -= t);
     }
-    let thin = thin.with_force(force);
+    let downsampled = downsampled.with_force(force);
     let moved = |rows: &Rows| baselines::fit(rows, selection.joint.kind, &columns).amplitudes;
-    let quarter = thin.blocks.div_ceil(FOLDS as usize).max(1) as u32;
-    let quarters: Vec<u32> = thin.block.iter().map(|b| b / quarter).collect();
+    let quarter = downsampled.blocks.div_ceil(FOLDS as usize).max(1) as u32;
+    let quarters: Vec<u32> = downsampled.block.iter().map(|b| b / quarter).collect();
     let mut largest = vec![0.0_f64; tangents.len()];
-    for grouping in [&thin.level, &thin.recording, &quarters] {
-        let variances = by_group(&thin, grouping, &moved);
+    for grouping in [&downsampled.level, &downsampled.recording, &quarters] {
+        let variances = by_group(&downsampled, grouping, &moved);
         largest.iter_mut().zip(variances).for_each(|(l, v)| *l = l.max(v));
     }
     largest

@@ -65,8 +65,8 @@ pub fn isolability(protocol: &Protocol, muscle: &Muscle<f64>) -> Result<Vec<Isol
     let contexts = moments(muscle, &campaign);
     let stride = contexts.len().div_ceil(PROTOCOL_ROWS).max(1);
     let keep: Vec<usize> = (0..contexts.len()).step_by(stride).collect();
-    let thin: Vec<Context<f64>> = keep.iter().map(|i| contexts[*i]).collect();
-    let basis = tables(&thin);
+    let kept: Vec<Context<f64>> = keep.iter().map(|i| contexts[*i]).collect();
+    let basis = tables(&kept);
     let span = pam_fit::bench::Span::of(&contexts);
     let laws: Vec<Candidate> = Candidate::all()
         .filter(|l| l.traits().imitates != Some(Imitates::ElasticOrders) && !l.traits().between_recordings)

@@ -29,7 +29,7 @@
 //! | | [`history`] | what the muscle remembers over a campaign of isometric staircases, before the search |
 //! | over campaigns | [`mod@reference`], [`timeline`] | what changed since a reference; quantities and change points over several campaigns |
 //! | over muscles | [`mod@stock`] | what muscles of one stock share, and what each has of its own |
-//! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`verdict::WhyNot`], [`experiment`], [`reserve`] | the answer as values; the report writes the sentences |
+//! | answer | [`verdict`], [`outcome`], [`remark`], [`why`], [`verdict::WhyNot`], [`experiment`], [`refit_comparison`] | the answer as values; the report writes the sentences |
 //! | | [`refitted_table`] | the table refitted beside the selected effects |
 //! | | [`next_experiment`], [`isolability`], [`protocol_simulation`] | the experiment that decides; what a planned protocol can show |
 //!
@@ -67,10 +67,10 @@ mod paired;
 mod preconditions;
 pub mod protocol_simulation;
 pub mod reference;
+pub mod refit_comparison;
 pub mod refitted_table;
 pub mod remark;
 mod renewed_laws;
-pub mod reserve;
 mod resolution;
 mod rest_friction;
 mod rows;

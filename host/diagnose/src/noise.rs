@@ -100,8 +100,8 @@ fn from_repeats(rows: &Rows, residual: &[f64]) -> Option<f64> {
                 (c.speed.abs().ln() * REPEAT_SPEED_BINS).round() as i32
             };
             let bin = (c.contraction / width).round() as i32;
-            let turn = if rows.isometric { runs[i] } else { rows.cycle[i] };
-            let cell = cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, turn)).or_default();
+            let repeat = if rows.isometric { runs[i] } else { rows.cycle[i] };
+            let cell = cells.entry((rows.level[i], rows.sign[i] as i8, bin, speed, repeat)).or_default();
             cell.sum += residual[i];
             cell.squares += residual[i] * residual[i];
             cell.count += 1.0;

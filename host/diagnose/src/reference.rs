@@ -22,10 +22,10 @@
 //! | `closed_valves` | a leak, by the pressure that closed valves lose |
 //! | `unknown` | a smooth change that no name describes |
 //! | `weighing` | how strongly the cells support each change |
-//! | `gate` | a change must show without any single mounting |
+//! | `leave_one_mounting_out` | a change must show without any single mounting |
 //! | `naming` | one name after the other |
 //! | `pairs` | two changes of which neither leads alone |
-//! | `withdrawal` | names that are withdrawn: another actuator, held-out recordings that get worse |
+//! | `withdrawn_findings` | findings that are withdrawn: another actuator, held-out recordings that get worse |
 //! | `posterior` | probabilities, set, verdict |
 //! | `isometric` | all of this for pressure staircases at held lengths |
 //! | `combined` | length and pressure that move together, taken apart into runs at nearly held lengths |
@@ -33,10 +33,10 @@
 //! | `strokes`, `stroked` | the same question for strokes at regulated pressures |
 //! | `sweeps` | runs at the reference's lengths, for quantities that are followed over campaigns |
 //! | `localise` | which cells differ |
-//! | `course` | since what moment, suddenly or gradually |
+//! | `time_course` | since what moment, suddenly or gradually |
 //! | `held_out` | how much of the difference is removed on held-out recordings |
 //! | `units` | columns in other units, another actuator |
-//! | `sides` | rows on both sides, sides in the wrong order |
+//! | `input_checks` | rows on both sides, sides in the wrong order |
 //! | `report`, `staircase_answer`, `stroke_answer` | from two sides to the answer |
 //! | `detectable` | the size from which on a change would be named |
 //! | [`answer`] | the answer as values |
@@ -52,13 +52,13 @@ mod closed_valves;
 mod combined;
 mod contrast;
 pub mod correction;
-mod course;
 mod detectable;
-mod gate;
 mod held_out;
+mod input_checks;
 mod interpolate;
 mod isometric;
 mod lag;
+mod leave_one_mounting_out;
 mod localise;
 mod naming;
 mod pairs;
@@ -67,7 +67,6 @@ pub(crate) mod repeatability;
 mod report;
 mod runs;
 pub mod shapes;
-mod sides;
 mod spline;
 mod stages;
 mod staircase_answer;
@@ -80,11 +79,12 @@ mod table_error;
 mod table_surface;
 #[cfg(test)]
 mod tests;
+mod time_course;
 mod units;
 mod unknown;
 mod updated;
 mod weighing;
-mod withdrawal;
+mod withdrawn_findings;
 
 pub(crate) use crate::criteria::reference as criteria;
 pub use answer::{ChangeReport, Verdict};

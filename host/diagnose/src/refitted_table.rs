@@ -7,7 +7,7 @@ use super::criteria::judgement::{CHECKED_COST, PREDICTIVE_COST, REFIT_ROUNDS};
 use super::history;
 use super::history::table_fit;
 use super::protocol_simulation::moments;
-use super::reserve::Reserve;
+use super::refit_comparison::RefitComparison;
 use super::verdict::{Diagnosis, Verdict};
 use pam_data::error::Result;
 use pam_data::muscle_description::MuscleDescription;
@@ -32,7 +32,7 @@ pub struct Refitted {
     /// What the fit warned of.
     pub warnings: Vec<String>,
     /// What is to be known of the effects in the table: that they were left out of it, or kept on the user's word alone.
-    pub reserve: Option<Reserve>,
+    pub comparison: Option<RefitComparison>,
 }
 
 /// Refits the table beside the named effects. They are kept only where the recordings are then predicted better, or about as well
@@ -88,15 +88,15 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         || measured && after <= CHECKED_COST * before
         || foretells && after <= PREDICTIVE_COST * before;
     let possible = with.table.check().is_ok();
-    let no_better = |kept: bool| Reserve { kept, with: after, without: before, left_out };
-    let mut reserve = None;
+    let no_better = |kept: bool| RefitComparison { kept, with: after, without: before, left_out };
+    let mut comparison = None;
     if given && !better && possible {
-        reserve = Some(no_better(true));
+        comparison = Some(no_better(true));
     } else if !(better && possible) {
         return Ok(without_effects(bare, before, warnings, Some(no_better(false))));
     }
     remember(&mut with, campaign);
-    Ok(Refitted { file: with, rms_before: before, rms_after: after, left_out, warnings, reserve })
+    Ok(Refitted { file: with, rms_before: before, rms_after: after, left_out, warnings, comparison })
 }
 
 /// The table with the memory that the history of the campaign shows, where it predicts the recordings better than the plain one. Its
@@ -116,13 +116,18 @@ fn with_memory(
     let better = after < before && file.table.check().is_ok();
     let warnings = file.about.fit.warnings.clone();
     let refitted =
-        Refitted { file, rms_before: before, rms_after: after, left_out: None, warnings, reserve: None };
+        Refitted { file, rms_before: before, rms_after: after, left_out: None, warnings, comparison: None };
     Ok(better.then_some(refitted))
 }
 
 /// The plain table, as the result where no effect goes into it.
-fn without_effects(file: TableFile, rms: f64, warnings: Vec<String>, reserve: Option<Reserve>) -> Refitted {
-    Refitted { file, rms_before: rms, rms_after: rms, left_out: None, warnings, reserve }
+fn without_effects(
+    file: TableFile,
+    rms: f64,
+    warnings: Vec<String>,
+    comparison: Option<RefitComparison>,
+) -> Refitted {
+    Refitted { file, rms_before: rms, rms_after: rms, left_out: None, warnings, comparison }
 }
 
 /// Leaves in each effect what the recordings left in the muscle, so that a controller takes over a muscle that was worked.

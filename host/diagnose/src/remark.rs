@@ -1,6 +1,6 @@
 //! What a diagnosis notes about the recordings, as values. The sentences are written by the report.
 
-use crate::reserve::Reserve;
+use crate::refit_comparison::RefitComparison;
 
 /// Why a campaign cannot be judged at all.
 #[derive(Clone, Debug, PartialEq)]
@@ -209,7 +209,7 @@ pub enum Remark {
         /// The file.
         file: String,
         /// What happened.
-        reserve: Reserve,
+        comparison: RefitComparison,
     },
 }
 

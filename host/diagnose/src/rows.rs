@@ -202,7 +202,7 @@ impl Rows {
         Self { recorded: Arc::new(Recorded { force, ..Recorded::clone(&self.recorded) }), ..self.clone() }
     }
     /// Every n-th row.
-    pub(crate) fn thinned(&self, stride: usize) -> Self {
+    pub(crate) fn downsampled(&self, stride: usize) -> Self {
         fn pick<T: Clone>(stride: usize, column: &[T]) -> Vec<T> {
             column.iter().step_by(stride).cloned().collect()
         }

@@ -7,7 +7,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | [`series`] | a quantity over the campaigns |
-//! | [`course`] | change points: a step or a slope against scatter, by evidence |
+//! | [`change_points`] | change points: a step or a slope against scatter, by evidence |
 //! | `held` | quantities of pressure sweeps at held lengths |
 //! | `stroked` | quantities of strokes at regulated pressures |
 //! | `fitted` | quantities of a table fitted to each campaign |
@@ -16,7 +16,7 @@
 //!
 //! The comparison of two campaigns is [`crate::reference`]; what a muscle remembers within one campaign is [`crate::history`].
 
-pub mod course;
+pub mod change_points;
 mod effects;
 mod fitted;
 mod held_length;
@@ -34,7 +34,7 @@ use pam_data::recording::Campaign;
 use crate::criteria::reference::OTHER_ACTUATOR;
 use crate::criteria::timeline::FEWEST_CAMPAIGNS;
 use crate::reference::{ChangeReport, Mounted, protocol_is_held};
-use course::Course;
+use change_points::ChangePoints;
 use series::{Kind, Series};
 
 /// One campaign of the actuator.
@@ -66,8 +66,8 @@ pub struct Options<'a> {
 pub struct Timeline {
     /// Index of the reference.
     pub reference: usize,
-    /// Every quantity and every effect that is named in some campaign, with its course.
-    pub series: Vec<(Series, Course)>,
+    /// Every quantity and every effect that is named in some campaign, with its change points.
+    pub series: Vec<(Series, ChangePoints)>,
     /// The comparison of each campaign with the reference; `None` for the reference.
     pub comparisons: Vec<Option<ChangeReport>>,
     /// What could not be computed, by campaign, and why.
@@ -103,11 +103,11 @@ pub fn timeline(visits: &[Visit], options: &Options<'_>) -> Result<Timeline> {
         all.extend(fitted::series(visits, muscle, &mut left_out));
     }
     let dates: Vec<f64> = visits.iter().map(|v| v.date).collect();
-    let with_course = |s: Series| {
-        let course = course::find(&dates, &s);
-        (s, course)
+    let with_change_points = |s: Series| {
+        let change_points = change_points::find(&dates, &s);
+        (s, change_points)
     };
-    let series = all.into_iter().filter(|s| s.count() > 0).map(with_course).collect();
+    let series = all.into_iter().filter(|s| s.count() > 0).map(with_change_points).collect();
     Ok(Timeline { reference: options.reference, series, comparisons, left_out })
 }
 
@@ -131,13 +131,13 @@ fn refuse_others(visits: &[Visit], comparisons: &[Option<ChangeReport>]) -> Resu
 }
 
 impl Timeline {
-    /// Series whose course holds a change.
-    pub fn changed(&self) -> impl Iterator<Item = &(Series, Course)> {
+    /// Series with a change.
+    pub fn changed(&self) -> impl Iterator<Item = &(Series, ChangePoints)> {
         self.series.iter().filter(|(_, c)| !c.changes.is_empty())
     }
 
     /// Series of one kind.
-    pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &(Series, Course)> {
+    pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &(Series, ChangePoints)> {
         self.series.iter().filter(move |(s, _)| s.kind == kind)
     }
 }

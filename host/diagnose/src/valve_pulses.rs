@@ -39,8 +39,8 @@ impl ValvePulses {
 
     /// Whether a reading, so long after the first one (s), rings after a pulse or may already belong to the next one.
     fn rings(&self, after: f64) -> bool {
-        let turns = (after - self.phase) / self.period;
-        let since = (turns - turns.floor()) * self.period;
+        let periods = (after - self.phase) / self.period;
+        let since = (periods - periods.floor()) * self.period;
         !(since >= RING_TIME.min(WINDOW_FROM * self.period) && since < WINDOW_TO * self.period)
     }
 }
@@ -110,8 +110,8 @@ fn fold(rate: &[f64], step: f64, period: f64) -> (f64, f64, Vec<f64>) {
     let bins = ((period / step) as usize).clamp(2, PULSE_BINS);
     let mut sums = vec![(0.0, 0.0); bins];
     for (k, r) in rate.iter().enumerate() {
-        let turns = (k as f64 + 0.5) * step / period;
-        let bin = (((turns - turns.floor()) * bins as f64) as usize).min(bins - 1);
+        let periods = (k as f64 + 0.5) * step / period;
+        let bin = (((periods - periods.floor()) * bins as f64) as usize).min(bins - 1);
         sums[bin] = (sums[bin].0 + r, sums[bin].1 + 1.0);
     }
     let means: Vec<f64> = sums.iter().map(|s| s.0 / f64::max(s.1, 1.0)).collect();

@@ -233,7 +233,7 @@ pub struct Profile {
     pub rms_after: Vec<f64>,
 }
 
-/// A residual over time, thinned for drawing.
+/// A residual over time, downsampled for drawing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trace {
     /// Time of each sample, s.

@@ -16,7 +16,7 @@
 //!     "name = 'm'\nkind = 'contractile'\nrest_length_mm = 281.0\nbraid_angle_deg = 61.4\n\
 //!      bladder_outer_diameter_mm = 10.0\nbladder_wall_mm = 1.8\nmax_contraction = 0.174\n",
 //! )?;
-//! let force = Published::named("bolen-10mm")?.force(&muscle, 620e3, 0.0);
+//! let force = Published::by_name("bolen-10mm")?.force(&muscle, 620e3, 0.0);
 //! assert!((force - 419.1).abs() < 0.1, "{force} N");
 //! # Ok::<(), pam_data::error::Error>(())
 //! ```

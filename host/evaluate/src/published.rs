@@ -30,7 +30,7 @@ impl Published {
     ///
     /// # Errors
     /// [`DataCode::CallInvalid`], listing the names.
-    pub fn named(name: &str) -> Result<Self> {
+    pub fn by_name(name: &str) -> Result<Self> {
         ALL.into_iter().find(|p| p.name == name).ok_or_else(|| {
             let known: Vec<&str> = ALL.iter().map(|p| p.name).collect();
             Error::new(DataCode::CallInvalid, "unknown published formula")
@@ -62,10 +62,10 @@ mod tests {
              bladder_outer_diameter_mm=10.0\nbladder_wall_mm=1.8\nmax_contraction=0.174\n",
         )
         .expect("valid");
-        let formula = Published::named("bolen-10mm").expect("known");
+        let formula = Published::by_name("bolen-10mm").expect("known");
         // 303.5 · atan(19.03 · 0.2735) = 303.5 · 1.38098
         assert!((formula.force(&muscle, 620e3, 0.0) - 419.13).abs() < 0.1);
         assert!(formula.force(&muscle, 620e3, 0.174) < 30.0);
-        assert_eq!(Published::named("x").expect_err("unknown").exit_status(), 2);
+        assert_eq!(Published::by_name("x").expect_err("unknown").exit_status(), 2);
     }
 }

@@ -125,7 +125,7 @@ pub struct Measured {
     /// Degrees of freedom of the deviations.
     pub freedom: f64,
     /// The first parameter with its 95 % interval, as text with practical units.
-    pub words: String,
+    pub text: String,
     /// Which check measured it, as text.
     pub check: &'static str,
 }

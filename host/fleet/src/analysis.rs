@@ -49,14 +49,14 @@ pub(crate) fn analyse(item: &WorkItem, inputs: &Inputs, options: &Options) -> An
     let loaded = match load(item, inputs) {
         Ok(loaded) => loaded,
         Err(error) => {
-            result.fail(Stage::Read, &inputs.named(error), item);
+            result.fail(Stage::Read, &inputs.with_original_name(error), item);
             return result;
         }
     };
     if let Some(muscle) = loaded.muscle.as_ref().filter(|_| options.task != Task::Diagnose) {
         match fit(&loaded.campaign, muscle, &options.fit) {
             Ok(fitted) => keep_fit(&mut result, fitted, item, inputs, &loaded, options),
-            Err(error) => result.fail(Stage::Fit, &inputs.named(error), item),
+            Err(error) => result.fail(Stage::Fit, &inputs.with_original_name(error), item),
         }
     }
     if options.task != Task::Fit {
@@ -75,7 +75,7 @@ fn diagnose(result: &mut Analysis, item: &WorkItem, inputs: &Inputs, loaded: &Lo
                 }
                 result.answer = Some(Answer::Change(Box::new(report)));
             }
-            Err(error) => result.fail(Stage::Diagnose, &inputs.named(error), item),
+            Err(error) => result.fail(Stage::Diagnose, &inputs.with_original_name(error), item),
         }
         return;
     }
@@ -97,7 +97,7 @@ fn diagnose(result: &mut Analysis, item: &WorkItem, inputs: &Inputs, loaded: &Lo
             }
             result.answer = Some(Answer::Diagnosis(Box::new(answer)));
         }
-        Err(error) => result.fail(Stage::Diagnose, &inputs.named(error), item),
+        Err(error) => result.fail(Stage::Diagnose, &inputs.with_original_name(error), item),
     }
 }
 
@@ -150,7 +150,7 @@ fn keep_fit(
     table.about.sources = sources;
     match table.to_bytes() {
         Ok(bytes) => result.files.push(("table.pam".into(), bytes)),
-        Err(error) => result.fail(Stage::Fit, &inputs.named(error), item),
+        Err(error) => result.fail(Stage::Fit, &inputs.with_original_name(error), item),
     }
     if options.reports {
         let page = fit_page::page(&fitted, &loaded.campaign, &options.fit);

@@ -28,7 +28,7 @@ pub struct Quantity {
 
 /// An effect that was named for a muscle.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Named {
+pub struct NamedEffect {
     /// Its name in the catalogue.
     pub effect: String,
     /// Probability that the name is right.
@@ -49,7 +49,7 @@ pub struct Member {
     /// The verdict of its diagnosis; `None` where there is none.
     pub verdict: Option<String>,
     /// Effects that the recordings support.
-    pub effects: Vec<Named>,
+    pub effects: Vec<NamedEffect>,
     /// What failed.
     pub failures: Vec<Failure>,
     /// The reports in its folder.
@@ -146,7 +146,7 @@ fn member(muscle: &str, fits: &Columns, diagnoses: &Columns, failures: &Columns)
     let effect = |row: usize| {
         // What was given as known and is not supported was not found.
         diagnoses.flag("supported", row).filter(|s| *s)?;
-        Some(Named {
+        Some(NamedEffect {
             effect: diagnoses.text("effect", row)?.to_owned(),
             probability: diagnoses.number("probability", row).unwrap_or(0.0),
             bench: diagnoses.flag("bench", row).unwrap_or(false),

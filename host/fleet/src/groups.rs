@@ -269,7 +269,7 @@ fn two_sided(z: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fleet::{Named, Quantity};
+    use crate::fleet::{NamedEffect, Quantity};
 
     #[test]
     fn p_values_are_those_of_exact_computations() {
@@ -300,7 +300,7 @@ mod tests {
         let member = |i: usize| {
             let (batch, rig) = (i % 3, i % 2);
             let noise = ((i * 7919) % 101) as f64 / 101.0;
-            let named = Named { effect: "sensor-delay".into(), probability: 0.9, bench: true };
+            let named = NamedEffect { effect: "sensor-delay".into(), probability: 0.9, bench: true };
             Member {
                 muscle: format!("m{i}"),
                 tags: [("batch", format!("B{batch}")), ("rig", rig.to_string()), ("serial", i.to_string())]

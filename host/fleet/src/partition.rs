@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use pam_data::error::{Error, Result};
-use pam_data::output::Turn;
+use pam_data::output::FolderLock;
 
 use crate::columns::{footer, rows};
 use crate::objects::Objects;
@@ -160,7 +160,7 @@ impl Folder {
         let partial = root.join(PARTIAL);
         fs::create_dir_all(&partial).map_err(|e| unwritable(root, e))?;
         // One run at a time looks for leftovers and makes its own place.
-        let _turn = Turn::of([Some(partial.join("lock").as_path())])?;
+        let _lock = FolderLock::of([Some(partial.join("lock").as_path())])?;
         remove_leftovers(&partial);
         let run = tempfile::Builder::new().prefix("run-").tempdir_in(&partial);
         let run = run.map_err(|e| unwritable(&partial, e))?.keep();

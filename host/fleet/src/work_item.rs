@@ -141,7 +141,7 @@ impl Inputs {
     }
 
     /// An error whose place names the object in the place of its copy.
-    pub(crate) fn named(&self, error: Error) -> Error {
+    pub(crate) fn with_original_name(&self, error: Error) -> Error {
         let Some(file) = error.place().file.clone() else { return error };
         match self.list.iter().find(|i| i.path == file && self.copies.is_some()) {
             Some(input) => error.file(Path::new(&input.name)),

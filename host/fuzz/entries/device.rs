@@ -87,8 +87,8 @@ impl Device {
         if self.above > u32::from(settings.watch.debounce_ticks) {
             assert!(state != State::Running && self.outputs.sides[0].vent, "too much pressure vents");
         }
-        let mut spoken = [0; MAX_TOPIC];
-        while self.shared.next_outgoing(&mut spoken).is_some() {}
+        let mut frame = [0; MAX_TOPIC];
+        while self.shared.next_outgoing(&mut frame).is_some() {}
         if self.shared.has_changed() {
             self.server.keep(&self.shared);
         }
@@ -157,8 +157,8 @@ pub fn states(bytes: &[u8]) -> Vec<State> {
         match first >> 6 {
             0 => device.hear(&take(&mut rest, n)),
             1 => {
-                let head = take(&mut rest, 2);
-                let &[id, more] = &head[..] else { break };
+                let header = take(&mut rest, 2);
+                let &[id, more] = &header[..] else { break };
                 let body = take(&mut rest, (8 * n + usize::from(more & 7)).min(MAX_BODY));
                 let mut wire = [0; MAX_WIRE];
                 let header = Header { kind: Kind::Request, id, sequence: 1 };

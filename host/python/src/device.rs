@@ -358,15 +358,15 @@ impl Link {
         };
         let profile = SetpointProfile::parse(profile, quantity).map_err(raised)?;
         let seconds = checked_seconds(seconds)?;
-        let (every_ticks, reach) =
+        let (every_ticks, reachability) =
             self.with(py, |client| Ok((every(client, rate)?, Reachability::of(client)?)))?;
-        if let Some(words) = reach.and_then(|reach| reach.beyond(quantity, &profile)) {
+        if let Some(reason) = reachability.and_then(|r| r.beyond(quantity, &profile)) {
             if !beyond {
                 return Err(raised(
-                    Error::new(DataCode::CallInvalid, words).help("request less, or pass beyond=True"),
+                    Error::new(DataCode::CallInvalid, reason).help("request less, or pass beyond=True"),
                 ));
             }
-            warn(py, &[words])?;
+            warn(py, &[reason])?;
         }
         let plan = Plan { quantity, profile, seconds, every_ticks };
         self.begin(py, move |client, exchange| {

@@ -197,7 +197,7 @@ fn append_texts(texts: &mut Vec<String>, array: &ArrayRef) {
 }
 
 /// Names and values of a recording's columns, as a file has them.
-fn named(recording: &HostRecording) -> Vec<(&'static str, &[f64])> {
+fn columns_of(recording: &HostRecording) -> Vec<(&'static str, &[f64])> {
     let mut columns = vec![
         ("time_s", recording.time.as_slice()),
         ("pressure_Pa", recording.pressure.as_slice()),
@@ -216,14 +216,14 @@ fn named(recording: &HostRecording) -> Vec<(&'static str, &[f64])> {
 fn stacked(recordings: &[HostRecording]) -> Vec<(&'static str, Vec<f64>)> {
     let mut names = vec!["time_s", "pressure_Pa", "displacement_m"];
     for optional in ["force_N", "temperature_K", "pressure_command_Pa"] {
-        if recordings.iter().any(|r| named(r).iter().any(|(name, _)| *name == optional)) {
+        if recordings.iter().any(|r| columns_of(r).iter().any(|(name, _)| *name == optional)) {
             names.push(optional);
         }
     }
     let column = |name: &str| {
         let mut values = Vec::new();
         for recording in recordings {
-            match named(recording).iter().find(|(n, _)| *n == name) {
+            match columns_of(recording).iter().find(|(n, _)| *n == name) {
                 Some((_, column)) => values.extend_from_slice(column),
                 None => values.resize(values.len() + recording.len(), f64::NAN),
             }

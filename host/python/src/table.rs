@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use model_core::inverse::Reach;
+use model_core::inverse::Attainability;
 use model_core::muscle::Muscle as Model;
 use model_core::units::{Force, Length, Pressure};
 use numpy::{IntoPyArray, PyArray1};
@@ -103,7 +103,7 @@ impl Table {
         let solve = |f: f64, x: f64, s: f64| {
             let held = model.at_stroke(Length::from_metres(x));
             let found = model.pressure_for(Force::from_newtons(f), &held, s, Pressure::ZERO, &search);
-            if found.reach == Reach::Reached { found.pressure.pascals() } else { f64::NAN }
+            if found.attainability == Attainability::Attainable { found.pressure.pascals() } else { f64::NAN }
         };
         let check = |places: &[(f64, f64)]| {
             let contractions = Contractions::of(model.braid());

@@ -102,7 +102,7 @@ fn long_series() -> Figure {
     let panel = Panel::new(Axis::new("time", "s"), Axis::new("force F", "N"))
         .hair("measured, a million rows", Colour::Muted, &time, &force)
         .step("command", Colour::Series(1), &time, &command);
-    Figure::new("long", "A long recording", "Thinned to what a screen can show.", panel)
+    Figure::new("long", "A long recording", "Downsampled to what a screen can show.", panel)
 }
 
 fn multiples() -> Figure {

@@ -54,7 +54,15 @@ impl Frame {
 }
 
 /// A text element. `anchor` is `start`, `middle` or `end`.
-pub(crate) fn text(out: &mut String, x: f64, y: f64, anchor: &str, colour: Colour, extra: &str, words: &str) {
+pub(crate) fn text(
+    out: &mut String,
+    x: f64,
+    y: f64,
+    anchor: &str,
+    colour: Colour,
+    extra: &str,
+    content: &str,
+) {
     let _ = write!(
         out,
         "<text x=\"{}\" y=\"{}\"{} class=\"F {}\" fill=\"{}\"{extra}>{}</text>",
@@ -63,6 +71,6 @@ pub(crate) fn text(out: &mut String, x: f64, y: f64, anchor: &str, colour: Colou
         if anchor == "start" { String::new() } else { format!(" text-anchor=\"{anchor}\"") },
         colour.class(),
         colour.literal(),
-        inline_markup::svg(words)
+        inline_markup::svg(content)
     );
 }

@@ -97,7 +97,7 @@ fn changes(r: &ChangeReport) -> Section {
                 m.confusable_with.join(", ")
             ));
         }
-        let apart = separate::named(m);
+        let apart = separate::of_change(m);
         if !apart.is_empty() {
             section.text(format!("To separate them: {}.", apart.join("; ")));
         }
@@ -105,7 +105,7 @@ fn changes(r: &ChangeReport) -> Section {
     if r.missing.is_empty() {
         section.text(wording::headline(r));
     }
-    if let Some((names, apart)) = separate::unnamed(r) {
+    if let Some((names, apart)) = separate::of_unnamed(r) {
         section.text(format!("It is one of {}. To separate them: {}.", names.join(", "), apart.join("; ")));
     }
     section.list(r.remarks.iter().map(wording::remark));

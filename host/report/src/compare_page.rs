@@ -8,7 +8,7 @@ use pam_data::recording::Recording;
 /// The page of a comparison of `b` with `a`.
 #[must_use]
 pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
-    let names = [named("A", a, b), named("B", b, a)];
+    let names = [labelled("A", a, b), labelled("B", b, a)];
     let mut page = Page::new("Two recordings compared", format!("{} and {}", names[0], names[1]));
     page.verdict(Tone::Plain, verdict(a, b, found));
     for c in &found.columns {
@@ -32,9 +32,9 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     }
     page.push(over_time);
     page.push(loops(a, b, &names));
-    for (letter, r) in [("A", a), ("B", b)] {
+    for (label, r) in [("A", a), ("B", b)] {
         page.origin(
-            format!("recording {letter}"),
+            format!("recording {label}"),
             format!("{}, {}, {} s", r.source.display(), pluralise(r.len(), "row"), fixed(r.duration(), 1)),
         );
     }
@@ -42,12 +42,12 @@ pub fn page(a: &Recording, b: &Recording, found: &Comparison) -> Page {
     page
 }
 
-/// The letter of a recording with its name; where both have the same name, with its folder.
-fn named(letter: &str, one: &Recording, other: &Recording) -> String {
+/// The label of a recording with its name; where both have the same name, with its folder.
+fn labelled(label: &str, one: &Recording, other: &Recording) -> String {
     if one.name == other.name && !one.source.as_os_str().is_empty() {
-        format!("{letter}: {}", one.source.display())
+        format!("{label}: {}", one.source.display())
     } else {
-        format!("{letter}: {}", one.name)
+        format!("{label}: {}", one.name)
     }
 }
 
@@ -181,8 +181,8 @@ fn symbol(name: &str) -> &'static str {
 }
 
 fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+    let mut characters = text.chars();
+    characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
 }
 
 /// Time after the start, s, and a quantity in the unit that it is compared in.

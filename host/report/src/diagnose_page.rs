@@ -227,10 +227,10 @@ fn what_it_is(d: &Diagnosis, m: &Missing) -> Section {
             p if p.outside_known_range => (std, "outside the published range"),
             _ => (std, ""),
         };
-        let letter = candidate
+        let symbol = candidate
             .and_then(|c| c.info().parameters.iter().find(|i| i.name == p.name))
-            .map_or("–", |i| i.letter);
-        table.row([letter.to_owned(), p.name.clone(), significant(p.value, 3), std, unit, remark.into()]);
+            .map_or("–", |i| i.symbol);
+        table.row([symbol.to_owned(), p.name.clone(), significant(p.value, 3), std, unit, remark.into()]);
     }
     section.table(table);
     if let Some(traded) = wording::traded_off(m) {

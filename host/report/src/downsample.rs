@@ -1,4 +1,4 @@
-//! Thinning of long series to what a picture can show.
+//! Downsampling of long series to what a picture can show.
 //!
 //! A picture is some hundred pixels wide; a recording may have a million rows. What is drawn keeps every extreme, so a
 //! spike of one sample stays visible.

@@ -89,7 +89,7 @@ fn parameters(trace: &Trace) -> Table {
         };
         let unit = if p.unit.is_empty() { "–" } else { p.unit };
         let numbers = [p.low, p.high, *value].map(|v| significant(v, 2));
-        table.row([p.letter, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
+        table.row([p.symbol, p.name, unit, &numbers[0], &numbers[1], &numbers[2], role]);
     }
     table
 }
@@ -106,14 +106,14 @@ pub fn page(trace: &Trace, figure: &super::Figure, all: &[(Trace, super::Figure)
     what.table(parameters(trace));
     what.text(memory(info));
     page.push(what);
-    let mut looks = Section::new("Trace").summarised();
+    let mut trace_section = Section::new("Trace").summarised();
     if trace.force.iter().all(|f| *f == 0.0) {
-        looks.text("The demonstration does not excite it: its force is zero here.");
+        trace_section.text("The demonstration does not excite it: its force is zero here.");
     } else {
-        looks.figure(figure.clone());
-        looks.text(alike(trace, all));
+        trace_section.figure(figure.clone());
+        trace_section.text(alike(trace, all));
     }
-    page.push(looks);
+    page.push(trace_section);
     page.origin("source of the equation", info.source);
     page
 }

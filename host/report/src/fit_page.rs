@@ -191,7 +191,7 @@ fn remarks(view: &View<'_>) -> Section {
     section.table(further_figures(view));
     let rows = &s.rows;
     let excluded = [
-        (rows.near_turn, "just after a reversal, where friction has not yet reversed"),
+        (rows.near_reversal, "just after a reversal, where friction has not yet reversed"),
         (rows.unknown_direction, "direction of motion unknown"),
         (rows.slack, "muscle slack"),
         (rows.pushed, "muscle pushed by the rig"),

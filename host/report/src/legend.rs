@@ -56,12 +56,12 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
         let low = if both { significant(-largest, 2) } else { "0".into() };
         let high = significant(largest, 2);
         let bar = 90.0;
-        let words = [label.as_str(), &low, &high].map(|t| inline_markup::width(t) * FONT_SIZE);
-        let (a, b) = room(words[0] + 10.0 + words[1] + 6.0 + bar + 6.0 + words[2]);
+        let widths = [label.as_str(), &low, &high].map(|t| inline_markup::width(t) * FONT_SIZE);
+        let (a, b) = room(widths[0] + 10.0 + widths[1] + 6.0 + bar + 6.0 + widths[2]);
         text(&mut out, a, b + 14.0, "start", Colour::Ink, "", label);
-        let start = a + words[0] + 10.0;
+        let start = a + widths[0] + 10.0;
         text(&mut out, start, b + 14.0, "start", Colour::Ink, "", &low);
-        let left = start + words[1] + 6.0;
+        let left = start + widths[1] + 6.0;
         let cells = 9;
         for i in 0..cells {
             let place = f64::from(i) / f64::from(cells - 1);
@@ -85,16 +85,16 @@ pub(crate) fn draw(figure: &Figure, width: f64, interactive: bool) -> (String, f
 
 /// `name` without characters in its middle, so that it is no wider than `width`: names of recordings differ at both ends.
 fn shortened(name: &str, width: f64) -> String {
-    let letters: Vec<char> = name.chars().collect();
+    let characters: Vec<char> = name.chars().collect();
     let without = |gone: usize| {
-        let kept = letters.len() - gone;
-        let (start, end) = (&letters[..kept.div_ceil(2)], &letters[letters.len() - kept / 2..]);
+        let kept = characters.len() - gone;
+        let (start, end) = (&characters[..kept.div_ceil(2)], &characters[characters.len() - kept / 2..]);
         start.iter().chain(&['…']).chain(end).collect::<String>()
     };
     if inline_markup::width(name) * FONT_SIZE <= width {
         return name.to_owned();
     }
-    (1..letters.len())
+    (1..characters.len())
         .map(without)
         .find(|short| inline_markup::width(short) * FONT_SIZE <= width)
         .unwrap_or_else(|| name.to_owned())

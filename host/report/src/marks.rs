@@ -86,7 +86,7 @@ fn rising(x: &[f64]) -> bool {
     x.windows(2).all(|w| !(w[1] < w[0]))
 }
 
-/// The points of a series on the paper, thinned; a break is a pair that is not finite.
+/// The points of a series on the paper, downsampled; a break is a pair that is not finite.
 fn on_canvas(frame: &Frame, x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     let xs: Vec<f64> = x.iter().map(|v| frame.x(*v)).collect();
     let ys: Vec<f64> = y.iter().map(|v| frame.y(*v)).collect();

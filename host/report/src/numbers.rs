@@ -6,7 +6,7 @@ use super::axis::{Axis, Scale};
 use super::figure::{Figure, Mark, Panel};
 use super::{downsample, inline_markup};
 
-/// The most rows of one layer that are written; longer series are thinned as they are for drawing.
+/// The most rows of one layer that are written; longer series are downsampled as they are for drawing.
 const MOST_ROWS: usize = 1_500;
 
 impl Figure {
@@ -22,7 +22,7 @@ impl Figure {
 fn csv(figure: &Figure) -> String {
     let mut out = String::new();
     let several = figure.panels.len() > 1;
-    let mut head = None;
+    let mut header = None;
     for panel in &figure.panels {
         // Panels with other axes start a table of their own, after an empty line.
         let (x, y) =
@@ -33,12 +33,12 @@ fn csv(figure: &Figure) -> String {
             if several { "panel," } else { "" },
             if wide { ",low,high" } else { "" }
         );
-        if head.as_ref() != Some(&this) {
-            if head.is_some() {
+        if header.as_ref() != Some(&this) {
+            if header.is_some() {
                 out.push('\n');
             }
             out.push_str(&this);
-            head = Some(this);
+            header = Some(this);
         }
         rows(&mut out, panel, several, wide);
     }

@@ -76,10 +76,10 @@ pub(crate) fn text(lengths: &MountedLengths) -> String {
         fixed(lengths.before, 2)
     );
     for c in &lengths.causes {
-        let (words, ..) = cause(c.cause);
+        let (description, ..) = cause(c.cause);
         let _ = writeln!(
             text,
-            "  {:>6} N  {words} of its own, {} rms{}",
+            "  {:>6} N  {description} of its own, {} rms{}",
             fixed(c.error, 2),
             size(c),
             too_large(c)
@@ -99,9 +99,9 @@ pub(crate) fn section(answer: &StockDiagnosis, lengths: &MountedLengths) -> Sect
         Table::new("One number for each mounting", &["of its own", "effect", "size, rms", "error, rms (N)"]);
     table.row(["nothing".to_owned(), String::new(), String::new(), fixed(lengths.before, 2)]);
     for c in &lengths.causes {
-        let (words, ..) = cause(c.cause);
+        let (description, ..) = cause(c.cause);
         table.row([
-            words.to_owned(),
+            description.to_owned(),
             c.cause.effect().info().name.to_owned(),
             size(c) + too_large(c),
             fixed(c.error, 2),

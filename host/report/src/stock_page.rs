@@ -183,11 +183,11 @@ fn laws(answer: &StockDiagnosis) -> Section {
         &["law", "effect", "parameter", "95 %", "error on left-out muscles (%)", "why not"],
     );
     for c in &answer.considered {
-        let (words, scale, unit) = law(c.law);
+        let (description, scale, unit) = law(c.law);
         let decimals = if c.law == Some(Law::Compliance) { 4 } else { 1 };
         let shown = |v: f64| format!("{} {unit}", fixed(scale * v, decimals));
         table.row([
-            words.to_owned(),
+            description.to_owned(),
             c.law.map_or("", Law::effect).to_owned(),
             c.parameter.as_ref().map_or(String::new(), |p| shown(p.value)),
             c.parameter.as_ref().map_or(String::new(), |p| format!("{} to {}", shown(p.low), shown(p.high))),

@@ -48,7 +48,7 @@ fn between_muscles(answer: &StockDiagnosis) -> String {
     match &answer.named {
         None => format!("The {count} muscles differ by chance only: no effect of their length is named."),
         Some((named, value, t)) => {
-            let (words, scale, unit) = law(Some(*named));
+            let (description, scale, unit) = law(Some(*named));
             let decimals = if *named == Law::Compliance { 4 } else { 1 };
             let others = if answer.confusable_with.is_empty() {
                 String::new()
@@ -56,7 +56,7 @@ fn between_muscles(answer: &StockDiagnosis) -> String {
                 format!(" These recordings do not distinguish it from {}.", answer.confusable_with.join(", "))
             };
             format!(
-                "{}: {words}. The parameter is {} {unit} (95 %), {t:.1} standard errors from zero.{others}",
+                "{}: {description}. The parameter is {} {unit} (95 %), {t:.1} standard errors from zero.{others}",
                 named.effect(),
                 plus_minus(value, scale, decimals)
             )
@@ -114,14 +114,14 @@ pub fn text(answer: &StockDiagnosis) -> String {
     text += &answer.mounted_lengths.as_ref().map_or_else(String::new, stock_mountings::text);
     text += "\nLaws between muscles, with the error on muscles that were left out\n";
     for c in &answer.considered {
-        let (words, scale, unit) = law(c.law);
+        let (description, scale, unit) = law(c.law);
         let decimals = if c.law == Some(Law::Compliance) { 4 } else { 1 };
         let value = c
             .parameter
             .as_ref()
             .map_or(String::new(), |p| format!(": {} {unit}", plus_minus(p, scale, decimals)));
         let why = c.why_not.map_or_else(String::new, |why| format!("; {}", law_refusal(why)));
-        let _ = writeln!(text, "  {:.2} %  {words}{value}{why}", 100.0 * c.error);
+        let _ = writeln!(text, "  {:.2} %  {description}{value}{why}", 100.0 * c.error);
     }
     text
 }

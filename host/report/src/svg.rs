@@ -173,18 +173,18 @@ fn panel(
     let y_ticks = ticks(&panel.y, y_ends, (height / 48.0) as usize);
     let widest = y_ticks.iter().map(|t| inline_markup::width(&t.text)).fold(0.0, f64::max) * FONT_SIZE;
     let margin = (widest + 9.0).clamp(26.0, cell_width * 0.5);
-    let mut head = 0.0;
+    let mut header_height = 0.0;
     if !panel.title.is_empty() {
         text(out, left, top + 14.0, "start", Colour::Ink, " font-weight=\"600\"", &panel.title);
-        head += 20.0;
+        header_height += 20.0;
     }
     if named_rows == 0 {
-        text(out, left, top + head + 13.0, "start", Colour::Ink, "", &panel.y.title());
-        head += 20.0;
+        text(out, left, top + header_height + 13.0, "start", Colour::Ink, "", &panel.y.title());
+        header_height += 20.0;
     }
     let frame = Frame {
         left: left + margin,
-        top: top + head + 2.0,
+        top: top + header_height + 2.0,
         width: (cell_width - margin - 8.0).max(20.0),
         height,
         x_ends,

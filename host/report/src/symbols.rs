@@ -73,8 +73,8 @@ fn names(law: &str) -> Vec<String> {
     for c in law.chars() {
         // An index of more than one letter is in brackets: `c_(M+1)`.
         index = if index { last != ')' } else { c == '(' && last == '_' };
-        let letter = (c.is_alphanumeric() && !"²³⁴π¼Σ".contains(c)) || "_′∂".contains(c);
-        if letter || index {
+        let is_symbol = (c.is_alphanumeric() && !"²³⁴π¼Σ".contains(c)) || "_′∂".contains(c);
+        if is_symbol || index {
             names.last_mut().expect("it begins with one").push(c);
         } else {
             names.push(String::new());
@@ -89,8 +89,8 @@ fn names(law: &str) -> Vec<String> {
 }
 
 /// Whether a symbol, or a small change of it, is among the names.
-fn occurs(letter: &str, names: &[String]) -> bool {
-    self::names(letter)
+fn occurs(symbol: &str, names: &[String]) -> bool {
+    self::names(symbol)
         .iter()
         .all(|part| names.iter().any(|n| n == part || n.strip_prefix('d') == Some(part)))
 }
@@ -109,9 +109,9 @@ pub fn symbols(info: &Info) -> Table {
     if names.iter().any(|n| n == "F") {
         table.row(["F on the right", "force of the base model with its friction, (1 − s·k_F)·F_quasi, N"]);
     }
-    for &(letter, what) in SYMBOLS {
-        if occurs(letter, &names) && info.parameters.iter().all(|p| p.letter != letter) {
-            table.row([letter, what]);
+    for &(symbol, what) in SYMBOLS {
+        if occurs(symbol, &names) && info.parameters.iter().all(|p| p.symbol != symbol) {
+            table.row([symbol, what]);
         }
     }
     table
@@ -129,33 +129,33 @@ mod tests {
     ];
 
     #[test]
-    fn every_explained_letter_that_is_not_a_parameter_is_in_an_equation() {
-        for &(letter, _) in SYMBOLS {
-            let used = Candidate::all().any(|c| symbols(c.info()).rows.iter().any(|r| r[0] == letter));
-            assert!(used, "{letter} is in no equation");
+    fn every_explained_symbol_that_is_not_a_parameter_is_in_an_equation() {
+        for &(symbol, _) in SYMBOLS {
+            let used = Candidate::all().any(|c| symbols(c.info()).rows.iter().any(|r| r[0] == symbol));
+            assert!(used, "{symbol} is in no equation");
         }
     }
 
     #[test]
-    fn every_letter_of_every_equation_is_explained_a_parameter_or_defined_by_the_equation_itself() {
+    fn every_symbol_of_every_equation_is_explained_a_parameter_or_defined_by_the_equation_itself() {
         for info in Candidate::all().map(|c| c.info()) {
             let table = symbols(info);
             let (_, law) = info.equation.split_once('=').unwrap();
             let all = names(law);
             for p in info.parameters {
                 // `LP_τ` has the parameter τ.
-                let index = format!("_{}", p.letter);
-                let there = occurs(p.letter, &all) || all.iter().any(|n| n.ends_with(&index));
-                assert!(there, "{}: {} is not in the equation", info.name, p.letter);
+                let index = format!("_{}", p.symbol);
+                let there = occurs(p.symbol, &all) || all.iter().any(|n| n.ends_with(&index));
+                assert!(there, "{}: {} is not in the equation", info.name, p.symbol);
             }
             for name in &all {
-                let is = |letter: &str| {
-                    names(letter).iter().any(|part| name == part || name.strip_prefix('d') == Some(part))
+                let is = |symbol: &str| {
+                    names(symbol).iter().any(|part| name == part || name.strip_prefix('d') == Some(part))
                 };
                 let defined =
                     info.equation.contains(&format!(", {name} =")) || WORDS.contains(&name.as_str());
                 let explained =
-                    table.rows.iter().any(|r| is(&r[0])) || info.parameters.iter().any(|p| is(p.letter));
+                    table.rows.iter().any(|r| is(&r[0])) || info.parameters.iter().any(|p| is(p.symbol));
                 assert!(defined || explained, "{}: {name} is not explained", info.name);
             }
         }
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_letter_that_is_a_parameter_is_left_to_it() {
+    fn a_symbol_that_is_a_parameter_is_left_to_it() {
         let explained =
             |name| symbols(Candidate::from_name(name).unwrap().info()).rows.iter().any(|r| r[0] == "m");
         assert!(explained("breakaway-friction") && !explained("gravity"));

@@ -6,7 +6,7 @@ use super::wording::timeline::{
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone};
 use pam_data::date::day;
 use pam_data::statistics::NORMAL_95;
-use pam_diagnose::timeline::course::Course;
+use pam_diagnose::timeline::change_points::ChangePoints;
 use pam_diagnose::timeline::series::{Kind, Series};
 use pam_diagnose::timeline::{Timeline, Visit};
 
@@ -66,13 +66,13 @@ fn quantities(visits: &[Visit], found: &Timeline, kind: Kind, title: &str) -> Se
         "Values, with 95 % intervals where recordings are repeated",
         &["quantity", "first campaign", "last campaign", "course"],
     );
-    for (index, (series, course)) in found.of_kind(kind).enumerate() {
+    for (index, (series, change_points)) in found.of_kind(kind).enumerate() {
         let id = format!("{}-{index}", name(&series.what));
         section.figure(Figure::new(
             id,
             name(&series.what),
             meaning(&series.what),
-            panel(visits, series, course),
+            panel(visits, series, change_points),
         ));
         let shown = |p: Option<&Option<_>>| {
             p.and_then(Option::as_ref).map_or_else(|| "–".to_owned(), |p| point(p, &series.unit))
@@ -81,7 +81,7 @@ fn quantities(visits: &[Visit], found: &Timeline, kind: Kind, title: &str) -> Se
             name(&series.what),
             shown(series.points.first()),
             shown(series.points.last()),
-            judged(series, course),
+            judged(series, change_points),
         ]);
     }
     section.table(table);
@@ -89,7 +89,7 @@ fn quantities(visits: &[Visit], found: &Timeline, kind: Kind, title: &str) -> Se
 }
 
 /// Values with intervals over the days, and the course that the changes make.
-fn panel(visits: &[Visit], series: &Series, course: &Course) -> Panel {
+fn panel(visits: &[Visit], series: &Series, change_points: &ChangePoints) -> Panel {
     let (scale, unit) = usual_unit(&series.unit);
     let start = visits.first().map_or(0.0, |v| v.date);
     let spread = visits.iter().any(|v| v.date > start);
@@ -114,7 +114,7 @@ fn panel(visits: &[Visit], series: &Series, course: &Course) -> Panel {
         panel = panel.intervals("95 % by repeats", Colour::Series(0), &interval_x, &end(-1.0), &end(1.0));
     }
     panel = panel.points("value", Colour::Series(0), &x, &value);
-    for c in &course.changes {
+    for c in &change_points.changes {
         panel = panel.region("change", at(c.from), at(c.to));
     }
     panel

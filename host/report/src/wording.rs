@@ -39,7 +39,8 @@ pub(crate) fn list(names: &[String]) -> String {
 
 /// With a capital and a full stop.
 pub(crate) fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let capital = letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect());
+    let mut characters = text.chars();
+    let capital =
+        characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect());
     if capital.ends_with(['.', '!', '?']) || capital.is_empty() { capital } else { capital + "." }
 }

@@ -1,4 +1,4 @@
-//! The page of a campaign: its course, what each step showed, the table, the diagnosis, force tracking.
+//! The page of a campaign: its steps, what each showed, the table, the diagnosis, force tracking.
 
 use pam_campaign::campaign::Done;
 use pam_campaign::engine::Engine;
@@ -9,7 +9,7 @@ use pam_report::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, wordin
 use crate::documents::campaign as document;
 
 /// Builds the page.
-pub(crate) fn page(engine: &Engine, course: &[Done], result: &document::Campaign) -> Page {
+pub(crate) fn page(engine: &Engine, steps: &[Done], result: &document::Campaign) -> Page {
     let mut page = Page::new("A campaign that chose its own steps", result.muscle.clone());
     let tone = if result.complete && settled(engine, result) { Tone::Good } else { Tone::Caution };
     let diagnosis = engine.diagnosis().map_or(String::new(), |d| format!(" {}", wording::verdict(d)));
@@ -25,8 +25,8 @@ pub(crate) fn page(engine: &Engine, course: &[Done], result: &document::Campaign
         page.fact("P_{0}", format!("{:.1} kPa", t.deadband_kPa), "deadband", Tone::Plain);
         page.fact("fit", format!("{:.2} %", t.mean_error_pct), "mean error, of blocked force", Tone::Plain);
     }
-    page.push(course_section(result));
-    page.push(time_section(engine, course, result));
+    page.push(steps_section(result));
+    page.push(time_section(engine, steps, result));
     if let Some(diagnosis) = engine.diagnosis() {
         page.push(diagnosis_section(diagnosis));
     }
@@ -65,7 +65,7 @@ fn diagnosis_section(diagnosis: &Diagnosis) -> Section {
     section
 }
 
-fn course_section(result: &document::Campaign) -> Section {
+fn steps_section(result: &document::Campaign) -> Section {
     let mut section = Section::new("Course");
     section.text(
         "Each step is the one with the most expected information per second: about the table, about which effect is missing, and about effects \
@@ -91,7 +91,7 @@ fn course_section(result: &document::Campaign) -> Section {
 }
 
 /// Pressure and stroke over the campaign, and the predicted error.
-fn time_section(engine: &Engine, course: &[Done], result: &document::Campaign) -> Section {
+fn time_section(engine: &Engine, steps: &[Done], result: &document::Campaign) -> Section {
     let mut section = Section::new("Recordings");
     let (mut time, mut pressure, mut stroke) = (Vec::new(), Vec::new(), Vec::new());
     for r in engine.recordings() {
@@ -117,7 +117,7 @@ fn time_section(engine: &Engine, course: &[Done], result: &document::Campaign) -
             panel("stroke ΔL", "mm", &stroke, Colour::Series(1)),
         ],
     ));
-    let mut known: Vec<(f64, f64)> = course
+    let mut known: Vec<(f64, f64)> = steps
         .iter()
         .filter(|d| d.chosen.predicted_error > 0.0)
         .map(|d| (d.clock_s.0, 100.0 * d.chosen.predicted_error / engine.places().blocked.max(1e-9)))

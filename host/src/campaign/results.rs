@@ -94,7 +94,7 @@ fn step(done: &Done) -> document::Step {
 }
 
 /// The document.
-pub(crate) fn document(engine: &Engine, course: &[Done], facts: &RunFacts<'_>) -> document::Campaign {
+pub(crate) fn document(engine: &Engine, steps: &[Done], facts: &RunFacts<'_>) -> document::Campaign {
     let blocked = engine.places().blocked.max(1e-9);
     let percent = |newtons: f64| 100.0 * newtons / blocked;
     let table = engine.findings().map(|f| {
@@ -129,10 +129,10 @@ pub(crate) fn document(engine: &Engine, course: &[Done], facts: &RunFacts<'_>) -
         controller: facts.controller.to_owned(),
         purpose: facts.purpose.to_owned(),
         minutes: facts.minutes,
-        bench_s: course.iter().map(|d| d.clock_s.1 - d.clock_s.0).sum(),
+        bench_s: steps.iter().map(|d| d.clock_s.1 - d.clock_s.0).sum(),
         complete: facts.complete,
         ended_by: facts.ended_by.to_owned(),
-        steps: course.iter().map(step).collect(),
+        steps: steps.iter().map(step).collect(),
         table,
         diagnosis,
         tracking: facts

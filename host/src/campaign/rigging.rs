@@ -41,7 +41,7 @@ pub(crate) struct Rigging {
     pub(crate) rig: Rig,
     pub(crate) muscle: MuscleDescription,
     /// Where the firmware runs, as text.
-    pub(crate) words: String,
+    pub(crate) description: String,
     /// The axis of the virtual bench, and the board that lives as long as this.
     pub(crate) emulated: Option<(Emulated, Axis)>,
 }
@@ -79,9 +79,9 @@ pub(crate) fn emulated(
         let made = checks::all(&bench, force, pressure, clock);
         Ok(made.into_iter().find(|c| c.name == check.file_name()).map(|c| c.csv))
     });
-    let words = emulated.description();
+    let description = emulated.description();
     let controller = Controller::new(client, Box::new(axis.clone()), made);
-    Ok(Rigging { controller, rig, muscle, words, emulated: Some((emulated, axis)) })
+    Ok(Rigging { controller, rig, muscle, description, emulated: Some((emulated, axis)) })
 }
 
 /// What the virtual bench does not have of a rig with this axis.
@@ -138,8 +138,8 @@ pub(crate) fn real(
     // A check without the muscle is done by hand; the program says when it is needed.
     rig.checks = false;
     let none: MakeCheck = Box::new(|_, _, _, _| Ok(None));
-    let words = format!("the controller at {}", client.port());
-    Ok(Rigging { controller: Controller::new(client, axis, none), rig, muscle, words, emulated: None })
+    let description = format!("the controller at {}", client.port());
+    Ok(Rigging { controller: Controller::new(client, axis, none), rig, muscle, description, emulated: None })
 }
 
 /// A campaign that was stopped by force leaves a controller that runs until its host has been silent for long enough, and is then vented

@@ -120,7 +120,8 @@ impl Arguments {
         let mut journal = Journal::open(&self.output)?;
         let continued = !journal.events().is_empty();
         let mut rigging = self.rigging(continued, &interrupted, console)?;
-        console.note(format!("{}; Ctrl-C vents the muscle, and the same call continues", rigging.words));
+        console
+            .note(format!("{}; Ctrl-C vents the muscle, and the same call continues", rigging.description));
         let (purpose, purpose_name) = self.purpose.purpose();
         let mut engine =
             Engine::new(rigging.muscle.clone(), rigging.rig.clone(), purpose, 60.0 * self.minutes)?;
@@ -134,7 +135,7 @@ impl Arguments {
         // What another program runs is left alone.
         let foreign = outcome.as_ref().is_err_and(|error| error.code() == DeviceCode::DeviceInUse);
         let vented = if foreign { Ok(()) } else { vent(rigging.controller.client()).map(drop) };
-        let (outcome, course) = outcome?;
+        let (outcome, steps) = outcome?;
         vented?;
         let (complete, reason) = match outcome {
             Outcome::Complete(reason) => (true, reason),
@@ -144,14 +145,14 @@ impl Arguments {
             }
         };
         let facts = RunFacts {
-            controller: &rigging.words.clone(),
+            controller: &rigging.description.clone(),
             purpose: purpose_name,
             minutes: self.minutes,
             complete,
             ended_by: &reason,
             tracking: Vec::new(),
         };
-        self.results(&mut engine, &mut rigging, &course, facts, console)
+        self.results(&mut engine, &mut rigging, &steps, facts, console)
     }
 
     fn rigging(&self, continued: bool, interrupted: &Arc<AtomicBool>, console: &Console) -> Result<Rigging> {
@@ -173,7 +174,7 @@ impl Arguments {
         &self,
         engine: &mut Engine,
         rigging: &mut Rigging,
-        course: &[Done],
+        steps: &[Done],
         mut facts: RunFacts<'_>,
         console: &Console,
     ) -> Result<()> {
@@ -186,11 +187,11 @@ impl Arguments {
             _ => Vec::new(),
         };
         pages(engine, &self.output)?;
-        let document = document(engine, course, &facts);
+        let document = document(engine, steps, &facts);
         let json = text(&document)?;
         write_whole(&self.output.join("campaign.json"), format!("{json}\n").as_bytes())?;
         let report = self.output.join("report.html");
-        write_whole(&report, in_page(page(engine, course, &document).html()).as_bytes())?;
+        write_whole(&report, in_page(page(engine, steps, &document).html()).as_bytes())?;
         if let (Some(before), true) = (&self.reference, facts.complete) {
             self.changed(engine, before, console)?;
         }
@@ -230,13 +231,13 @@ impl Arguments {
         earlier.sort();
         let now = engine.recordings().iter().map(|r| r.source.clone().into_os_string());
         let report = self.output.join("changed.html").into_os_string();
-        let mut words = vec!["diagnose".into(), "--report".into(), report];
+        let mut arguments = vec!["diagnose".into(), "--report".into(), report];
         if let Some(muscle) = &self.muscle {
-            words.extend(["--muscle".into(), muscle.clone().into_os_string()]);
+            arguments.extend(["--muscle".into(), muscle.clone().into_os_string()]);
         }
-        words.extend(now);
-        words.push("--reference".into());
-        words.extend(earlier.into_iter().map(PathBuf::into_os_string));
-        super::diagnose::Arguments::of(words)?.run(console)
+        arguments.extend(now);
+        arguments.push("--reference".into());
+        arguments.extend(earlier.into_iter().map(PathBuf::into_os_string));
+        super::diagnose::Arguments::of(arguments)?.run(console)
     }
 }

@@ -18,7 +18,7 @@ use crate::console::Console;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{Turn, to_standard_output, write_whole};
+use pam_data::output::{FolderLock, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
 use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
@@ -82,10 +82,10 @@ impl Arguments {
     /// The arguments of a call that another command makes.
     ///
     /// # Errors
-    /// [`DataCode::CallInvalid`] for words that the command does not take.
-    pub(super) fn of(words: Vec<std::ffi::OsString>) -> Result<Self> {
+    /// [`DataCode::CallInvalid`] for arguments that the command does not take.
+    pub(super) fn of(arguments: Vec<std::ffi::OsString>) -> Result<Self> {
         let command = Self::augment_args(clap::Command::new("diagnose"));
-        let matches = command.try_get_matches_from(words);
+        let matches = command.try_get_matches_from(arguments);
         matches
             .and_then(|m| Self::from_arg_matches(&m))
             .map_err(|e| Error::new(DataCode::CallInvalid, e.to_string()))
@@ -110,7 +110,7 @@ impl Arguments {
             return reference::run(&self, console, taken);
         }
         let start = Instant::now();
-        let given = self.with.iter().map(|name| effects::named(name.trim())).collect::<Result<Vec<_>>>()?;
+        let given = self.with.iter().map(|name| effects::by_name(name.trim())).collect::<Result<Vec<_>>>()?;
         let Some(path) = self.muscles.first() else {
             return Err(Error::new(DataCode::CallInvalid, "the muscle's description is missing")
                 .help("give --muscle M.toml"));
@@ -137,7 +137,7 @@ impl Arguments {
         // The progress line is removed before other output.
         drop(options);
         console.detail(format!("diagnosed in {:.3} s", diagnosed.as_secs_f64()));
-        let _turn = Turn::of([
+        let _lock = FolderLock::of([
             self.output.as_deref(),
             self.json.as_deref(),
             self.next.as_deref(),
@@ -166,8 +166,8 @@ impl Arguments {
             diagnose_page::page_with_residuals(&answer, &muscle.geometry(), &campaign, residuals)
         })?;
         if self.json.as_deref() != Some(Path::new("-")) {
-            let words = summary(&answer, residuals);
-            if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+            let text = summary(&answer, residuals);
+            if taken { console.note(text.trim_end()) } else { console.result(text.trim_end()) }
         }
         console.detail(format!("done in {:.3} s", start.elapsed().as_secs_f64()));
         Ok(())
@@ -217,8 +217,8 @@ impl Arguments {
         if !faults.is_empty() {
             console.warning(format!("{} is useless for control: {}", path.display(), faults.join(". ")));
         }
-        if let Some(reserve) = refitted.reserve {
-            answer.remarks.push(Remark::Table { file: path.display().to_string(), reserve });
+        if let Some(comparison) = refitted.comparison {
+            answer.remarks.push(Remark::Table { file: path.display().to_string(), comparison });
         } else if let Some((plain, with)) = refitted.left_out.filter(|(plain, with)| with < plain) {
             console.note(format!(
                 "{}: mean error at a pressure left out of the fit: {with:.2} % of blocked force with the named effects, {plain:.2} % without",
@@ -238,13 +238,13 @@ impl Arguments {
 
 /// The answer as text, with the residuals of the table without effects by recording.
 fn summary(answer: &Diagnosis, residuals: &[RecordingResidual]) -> String {
-    let mut words = wording::summary(answer);
+    let mut text = wording::summary(answer);
     let table = recording_table(residuals);
     if !table.is_empty() {
-        words += &format!("\nOf the table without effects: {table}\n");
+        text += &format!("\nOf the table without effects: {table}\n");
     }
     if let Some(history) = &answer.history {
-        words += &format!("\n{}", history_text::text(history));
+        text += &format!("\n{}", history_text::text(history));
     }
-    words
+    text
 }

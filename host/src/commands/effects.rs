@@ -53,7 +53,7 @@ impl Arguments {
             }
             return Ok(());
         };
-        let candidate = named(name)?;
+        let candidate = by_name(name)?;
         let taken =
             to_standard_output(&[("--json", printed(self.json)), ("--report", self.report.as_deref())])?;
         if self.json {
@@ -82,7 +82,7 @@ fn catalogue() -> Result<Vec<(pam_report::effect_trace::Trace, pam_report::Figur
 ///
 /// # Errors
 /// An unknown name; the nearest is suggested.
-pub(super) fn named(name: &str) -> Result<Candidate> {
+pub(super) fn by_name(name: &str) -> Result<Candidate> {
     Candidate::from_name(name).ok_or_else(|| unknown(name))
 }
 
@@ -127,7 +127,7 @@ fn explain(candidate: Candidate) -> String {
         let _ = writeln!(
             text,
             "{}",
-            format!("  {:8} {:24} {} to {} {}", p.letter, p.name, p.low, p.high, p.unit).trim_end()
+            format!("  {:8} {:24} {} to {} {}", p.symbol, p.name, p.low, p.high, p.unit).trim_end()
         );
     }
     text.push('\n');
@@ -151,14 +151,14 @@ fn to_document(candidate: Candidate) -> document::Effect {
             .iter()
             .map(|p| document::Parameter {
                 name: p.name,
-                letter: p.letter,
+                symbol: p.symbol,
                 unit: p.unit,
                 low: p.low,
                 high: p.high,
                 amplitude: p.role == model_core::effects::Role::Amplitude,
             })
             .collect(),
-        letters: symbols(info).rows.into_iter().map(|r| (r[0].clone(), r[1].clone())).collect(),
+        symbols: symbols(info).rows.into_iter().map(|r| (r[0].clone(), r[1].clone())).collect(),
         source: info.source,
     }
 }

@@ -75,9 +75,10 @@ impl Arguments {
             allow_silence(&mut Client::open(emulated.address())?, self.speed)?;
         }
         if self.json {
-            let (port, words) = (emulated.address().to_string(), emulated.description());
+            let (port, description) = (emulated.address().to_string(), emulated.description());
             let axis = axis.as_deref();
-            let document = bench::Emulate { schema: "pam-emulate/1", port: &port, controller: &words, axis };
+            let document =
+                bench::Emulate { schema: "pam-emulate/1", port: &port, controller: &description, axis };
             console.result(line(&document)?);
         } else {
             console.result(emulated.address());

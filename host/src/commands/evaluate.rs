@@ -93,7 +93,7 @@ impl Arguments {
     /// What is wrong with the input.
     pub fn run(self, console: &Console) -> Result<()> {
         to_standard_output(&[("--json", self.json.as_deref()), ("--report", self.reports.file())])?;
-        let published = self.published.as_deref().map(Published::named).transpose()?;
+        let published = self.published.as_deref().map(Published::by_name).transpose()?;
         let options = Options {
             order: usize::from(self.order),
             fit_geometry: self.fit_geometry,
@@ -156,12 +156,12 @@ impl Arguments {
                 return Ok(());
             }
         }
-        let words = to_text(&cases, &lengths, &stock, self.published.as_deref());
+        let text = to_text(&cases, &lengths, &stock, self.published.as_deref());
         // If the report goes to standard output, nothing else does.
         if self.reports.file() == Some(Path::new("-")) {
-            console.note(words)
+            console.note(text)
         } else {
-            console.result(words)
+            console.result(text)
         }
         Ok(())
     }

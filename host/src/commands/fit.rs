@@ -12,7 +12,7 @@ use crate::documents::text;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{Turn, to_standard_output, write_whole};
+use pam_data::output::{FolderLock, to_standard_output, write_whole};
 use pam_data::pluralise::pluralise;
 use pam_fit::{Options, Summary, fit_with_progress};
 
@@ -99,7 +99,7 @@ impl Arguments {
         let mut table = fitted.table_file(format!("host {}", env!("CARGO_PKG_VERSION")));
         table.about.date = date::now_utc();
         table.about.sources = table_file::sources(&campaign, &self.recordings.files, hashes);
-        let _turn = Turn::of([
+        let _lock = FolderLock::of([
             self.output.as_deref(),
             self.json.as_deref(),
             self.reports.file(),

@@ -12,7 +12,7 @@ use crate::console::Console;
 use crate::documents::{history as document, text};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{Turn, to_standard_output, write_whole};
+use pam_data::output::{FolderLock, to_standard_output, write_whole};
 use pam_diagnose::reference::Mounted;
 use pam_diagnose::timeline::{Options, timeline};
 use pam_report::timeline_page;
@@ -90,7 +90,7 @@ impl Arguments {
         let options = Options { muscle: muscle.as_ref(), reference, mounted };
         let found = timeline(&visits, &options)?;
         console.detail(format!("compared in {:.3} s", start.elapsed().as_secs_f64()));
-        let _turn = Turn::of([
+        let _lock = FolderLock::of([
             self.json.as_deref(),
             self.csv.as_deref(),
             self.reports.file(),
@@ -106,8 +106,8 @@ impl Arguments {
         self.reports.write(console, &reports::provenance(), || timeline_page::page(&visits, &found))?;
         let printed = |p: &Option<PathBuf>| p.as_deref() == Some(Path::new("-"));
         if !printed(&self.json) && !printed(&self.csv) {
-            let words = wording::summary(&visits, &found);
-            if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+            let text = wording::summary(&visits, &found);
+            if taken { console.note(text.trim_end()) } else { console.result(text.trim_end()) }
         }
         Ok(())
     }

@@ -133,8 +133,8 @@ impl Arguments {
         } else {
             format!("{} in {names}, {} missing", pluralise(rows, "sample"), losses.samples)
         });
-        if let Some((words, _)) = changed.filter(|_| !self.json) {
-            console.result(words.trim_end());
+        if let Some((text, _)) = changed.filter(|_| !self.json) {
+            console.result(text.trim_end());
         }
         Ok(())
     }

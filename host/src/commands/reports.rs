@@ -61,9 +61,9 @@ impl Reports {
 /// The provenance of a report of this call: its command line and the version of the program.
 #[must_use]
 pub(super) fn provenance() -> Provenance {
-    let words: Vec<String> = std::env::args().skip(1).map(|word| quoted(&word)).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).map(|argument| quoted(&argument)).collect();
     Provenance {
-        command: format!("{} {}", program_name::called(), words.join(" ")),
+        command: format!("{} {}", program_name::called(), arguments.join(" ")),
         program: format!("host {}", env!("CARGO_PKG_VERSION")),
         ..Provenance::default()
     }
@@ -79,13 +79,13 @@ pub(super) fn of_files(files: &[PathBuf]) -> Provenance {
     Provenance { files: files.iter().filter_map(hashed).collect(), ..provenance() }
 }
 
-/// A word of a command line as a shell reads it back.
-fn quoted(word: &str) -> String {
+/// An argument of a command line as a shell reads it back.
+fn quoted(argument: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./:=,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
+    if !argument.is_empty() && argument.chars().all(plain) {
+        argument.to_owned()
     } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
+        format!("'{}'", argument.replace('\'', r"'\''"))
     }
 }
 
@@ -94,7 +94,7 @@ mod tests {
     use super::quoted;
 
     #[test]
-    fn words_are_quoted_where_a_shell_would_change_them() {
+    fn arguments_are_quoted_where_a_shell_would_change_them() {
         assert_eq!(quoted("--where=run=1,2"), "--where=run=1,2");
         assert_eq!(quoted("my muscle.csv"), "'my muscle.csv'");
         assert_eq!(quoted("it's"), r"'it'\''s'");

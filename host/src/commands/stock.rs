@@ -6,7 +6,7 @@ use clap::Args;
 use pam_data::date;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
-use pam_data::output::{Turn, printed, to_standard_output};
+use pam_data::output::{FolderLock, printed, to_standard_output};
 use pam_data::recording::Reader;
 use pam_fit::table_file::{self, FitQuality, TableFile};
 use pam_fleet::fleet::Fleet;
@@ -69,7 +69,7 @@ impl Arguments {
                 mountings: Vec::new(),
                 earlier_load: None,
             };
-            let _turn = Turn::of([Some(path.as_path())])?;
+            let _lock = FolderLock::of([Some(path.as_path())])?;
             TableFile { table: found.table.clone(), about }.write(path)?;
         }
         let document = to_document(&muscle, &found);

@@ -54,13 +54,13 @@ pub(crate) struct Column {
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Plan<'a> {
     pub schema: &'static str,
-    pub effects: Vec<Planned<'a>>,
+    pub effects: Vec<EffectVisibility<'a>>,
 }
 
 /// What a protocol shows of one effect.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub(crate) struct Planned<'a> {
+pub(crate) struct EffectVisibility<'a> {
     pub effect: &'a str,
     /// Share of its energy that tables free over pressure cannot imitate.
     pub visible: f64,
@@ -68,7 +68,7 @@ pub(crate) struct Planned<'a> {
     pub confounded_with: &'a [(String, f64)],
 }
 
-impl<'a> Planned<'a> {
+impl<'a> EffectVisibility<'a> {
     pub(crate) fn of(row: &'a Isolability) -> Self {
         Self { effect: &row.effect, visible: row.visible, confounded_with: &row.confounded_with }
     }

@@ -29,7 +29,7 @@ pub(crate) struct Campaign {
     pub tracking: Vec<Tracking>,
 }
 
-/// One step of the course.
+/// One step of the campaign.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Step {

@@ -26,7 +26,8 @@ pub(crate) struct Effect {
     pub equation: &'static str,
     pub parameters: Vec<Parameter>,
     /// Symbols of the equation that are not its parameters.
-    pub letters: BTreeMap<String, String>,
+    #[serde(rename = "letters")]
+    pub symbols: BTreeMap<String, String>,
     pub source: &'static str,
 }
 
@@ -36,7 +37,8 @@ pub(crate) struct Effect {
 pub(crate) struct Parameter {
     pub name: &'static str,
     /// Its symbol.
-    pub letter: &'static str,
+    #[serde(rename = "letter")]
+    pub symbol: &'static str,
     pub unit: &'static str,
     pub low: f64,
     pub high: f64,

@@ -9,7 +9,7 @@ use serde::Serialize;
 use pam_data::date::day;
 use pam_data::muscle_description::MuscleDescription;
 use pam_diagnose::reference::ChangeReport;
-use pam_diagnose::timeline::course::{self, Course, How};
+use pam_diagnose::timeline::change_points::{self, ChangePoints, How};
 use pam_diagnose::timeline::series::{Kind, Series};
 use pam_diagnose::timeline::{Timeline, Visit};
 use pam_report::wording::timeline as wording;
@@ -58,13 +58,13 @@ struct Comparison {
     /// What repeats, N.
     noise_N: f64,
     /// Named changes.
-    missing: Vec<Named>,
+    missing: Vec<NamedChange>,
 }
 
 /// A named change of a campaign against the reference.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-struct Named {
+struct NamedChange {
     effect: String,
     probability: f64,
     value: Option<f64>,
@@ -161,7 +161,7 @@ fn campaign(visit: &Visit, comparison: Option<&ChangeReport>) -> Campaign {
                 .iter()
                 .map(|m| {
                     let size = m.parameters.first();
-                    Named {
+                    NamedChange {
                         effect: m.effect.clone(),
                         probability: m.probability,
                         value: size.map(|s| s.value),
@@ -175,7 +175,7 @@ fn campaign(visit: &Visit, comparison: Option<&ChangeReport>) -> Campaign {
     }
 }
 
-fn quantity(series: &Series, course: &Course) -> Quantity {
+fn quantity(series: &Series, change_points: &ChangePoints) -> Quantity {
     let value = |p: &pam_diagnose::timeline::series::Point| {
         let interval = p.interval();
         Value { value: p.value, low: interval.map(|i| i.0), high: interval.map(|i| i.1), named: p.named }
@@ -190,12 +190,12 @@ fn quantity(series: &Series, course: &Course) -> Quantity {
         unit: series.unit.clone(),
         meaning: wording::meaning(&series.what),
         values: series.points.iter().map(|p| p.as_ref().map(value)).collect(),
-        probability_no_change: (!course.too_few).then_some(course.none),
-        scatter: course.scatter,
+        probability_no_change: (!change_points.too_few).then_some(change_points.none),
+        scatter: change_points.scatter,
     }
 }
 
-fn change(visits: &[Visit], series: &Series, change: &course::Change) -> Change {
+fn change(visits: &[Visit], series: &Series, change: &change_points::Change) -> Change {
     let half = NORMAL_95 * change.std;
     Change {
         quantity: wording::name(&series.what),

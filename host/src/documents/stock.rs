@@ -21,7 +21,7 @@ pub(crate) struct StockDocument {
     /// differ by chance only.
     pub verdict: &'static str,
     /// The effects that are named.
-    pub missing: Vec<Named>,
+    pub missing: Vec<StockEffect>,
     pub shared: Shared,
     pub muscles: Vec<Muscle>,
     /// Standard deviations of what muscles and mountings have of their own.
@@ -48,7 +48,7 @@ pub(crate) struct Estimate {
 /// An effect of the stock.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub(crate) struct Named {
+pub(crate) struct StockEffect {
     pub effect: &'static str,
     pub law: &'static str,
     pub parameter: Estimate,
@@ -215,8 +215,8 @@ fn mountings(of: &MountedLengths) -> UnseenMountings {
 }
 
 /// The entry of the mounted lengths, where they are named.
-fn lengths(of: &MountedLengths) -> Option<Named> {
-    of.named().then(|| Named {
+fn lengths(of: &MountedLengths) -> Option<StockEffect> {
+    of.named().then(|| StockEffect {
         effect: MountingCause::Length.effect().info().name,
         law: "x = x_read + d, each mounting its own d; rms of d",
         parameter: estimate(&of.size, 1e3, "mm"),
@@ -256,10 +256,10 @@ fn muscle(of: &MuscleOwn, mountings: Option<MuscleMountings>) -> Muscle {
 }
 
 fn tried(of: &Considered) -> Tried {
-    let (words, scale, unit) = law(of.law);
+    let (description, scale, unit) = law(of.law);
     Tried {
         effect: of.law.map(Law::effect),
-        law: words,
+        law: description,
         parameter: of.parameter.as_ref().map(|p| estimate(p, scale, unit)),
         jackknife_std: of.jackknife.map(|j| j * scale),
         left_out_error_pct: 100.0 * of.error,
@@ -280,10 +280,10 @@ fn place(of: &SharedPlace) -> Place {
 pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
     let deviations = &answer.fitted.fit.deviations;
     let named = answer.named.as_ref().map(|(of, interval, t)| {
-        let (words, scale, unit) = law(Some(*of));
-        Named {
+        let (description, scale, unit) = law(Some(*of));
+        StockEffect {
             effect: of.effect(),
-            law: words,
+            law: description,
             parameter: estimate(interval, scale, unit),
             t: *t,
             confusable_with: answer.confusable_with.clone(),
@@ -291,7 +291,7 @@ pub(crate) fn of(answer: &StockDiagnosis) -> StockDocument {
         }
     });
     let held = answer.mounted_lengths.as_ref();
-    let missing: Vec<Named> = named.into_iter().chain(held.and_then(lengths)).collect();
+    let missing: Vec<StockEffect> = named.into_iter().chain(held.and_then(lengths)).collect();
     let own = |m: usize| held.and_then(|h| h.muscles.get(m).copied().flatten());
     StockDocument {
         schema: "pam-diagnose-stock/1",

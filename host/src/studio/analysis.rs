@@ -39,11 +39,11 @@ pub struct Analysis {
 }
 
 /// The name of a recording on the page, and its file.
-type Named = (String, PathBuf);
+type NamedFile = (String, PathBuf);
 
 #[derive(Debug, Default)]
 struct Known {
-    recordings: Vec<Named>,
+    recordings: Vec<NamedFile>,
     /// The table of the last fit that ended.
     table: Option<PathBuf>,
     reports: VecDeque<(String, Arc<str>)>,
@@ -225,21 +225,22 @@ impl Analysis {
         Ok((name, all.remove(0)))
     }
 
-    /// The curves of a recording, thinned for the eye.
+    /// The curves of a recording, downsampled for drawing.
     ///
     /// # Errors
     /// A recording that is not there or cannot be read.
     pub fn curves(&self, number: usize) -> Result<Curves> {
         let (name, r) = self.one(number)?;
         let every = r.len().div_ceil(POINTS).max(1);
-        let thin = |v: &[f64], scale: f64| v.iter().step_by(every).map(|x| x * scale).collect::<Vec<_>>();
+        let downsampled =
+            |v: &[f64], scale: f64| v.iter().step_by(every).map(|x| x * scale).collect::<Vec<_>>();
         let start = r.time.first().copied().unwrap_or(0.0);
         Ok(Curves {
             name,
             t: r.time.iter().step_by(every).map(|t| t - start).collect(),
-            F: r.force.as_ref().map(|f| thin(f, 1.0)),
-            P: thin(&r.pressure, 1e-3),
-            x: thin(&r.stroke, 1e3),
+            F: r.force.as_ref().map(|f| downsampled(f, 1.0)),
+            P: downsampled(&r.pressure, 1e-3),
+            x: downsampled(&r.stroke, 1e3),
             rows: r.len(),
         })
     }

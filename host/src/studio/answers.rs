@@ -146,7 +146,7 @@ pub struct Recordings {
     pub(super) muscle: Option<String>,
 }
 
-/// The curves of a recording, thinned.
+/// The curves of a recording, downsampled.
 #[derive(Debug, Serialize)]
 #[allow(non_snake_case, reason = "the page's names")]
 pub struct Curves {

@@ -13,7 +13,7 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 
-/// Time for the head of a request, and for its body.
+/// Time for the header of a request, and for its body.
 pub(super) const ARRIVAL: Duration = Duration::from_secs(10);
 /// Pause after the system refused a connection, for instance for lack of file handles.
 const REFUSED: Duration = Duration::from_millis(50);
@@ -23,8 +23,8 @@ const REFUSED: Duration = Duration::from_millis(50);
 pub(super) struct Limits {
     /// Connections at a time. A browser opens six to one origin; this is enough for ten.
     pub connections: usize,
-    /// Time for the head of a request.
-    pub head: Duration,
+    /// Time for the header of a request.
+    pub header: Duration,
     /// What happens at the limit.
     pub beyond: Beyond,
 }
@@ -40,7 +40,7 @@ pub(super) enum Beyond {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { connections: 64, head: ARRIVAL, beyond: Beyond::Refused }
+        Self { connections: 64, header: ARRIVAL, beyond: Beyond::Refused }
     }
 }
 
@@ -71,7 +71,7 @@ pub(super) async fn serve(listener: TcpListener, app: Router, limits: Limits) {
             // A connection that breaks concerns its browser only.
             let _ = hyper::server::conn::http1::Builder::new()
                 .timer(TokioTimer::new())
-                .header_read_timeout(limits.head)
+                .header_read_timeout(limits.header)
                 .serve_connection(TokioIo::new(stream), service)
                 .await;
         }));
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_request_whose_head_does_not_end_is_given_up() {
-        let limits = Limits { head: Duration::from_millis(50), ..Limits::default() };
+        let limits = Limits { header: Duration::from_millis(50), ..Limits::default() };
         let mut stream = connect(start(limits));
         stream.write_all(b"GET / HTTP/1.1\r\nHost: x\r\nSlow: ").unwrap();
         let mut rest = Vec::new();
@@ -144,10 +144,10 @@ mod tests {
 
     #[test]
     fn where_vents_arrive_idle_connections_keep_no_new_one_out() {
-        let limits = Limits { connections: 4, head: Duration::from_secs(3_600), beyond: Beyond::Replaces };
+        let limits = Limits { connections: 4, header: Duration::from_secs(3_600), beyond: Beyond::Replaces };
         let address = start(limits);
         let mut idle: Vec<TcpStream> = (0..12).map(|_| connect(address)).collect();
-        // Half a head, a body that does not come, and nothing at all.
+        // Half a header, a body that does not come, and nothing at all.
         idle[10].write_all(b"GET / HTTP/1.1\r\nHo").unwrap();
         idle[11].write_all(b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\n").unwrap();
         let mut fresh = connect(address);

@@ -131,7 +131,7 @@ impl Shared {
         &self,
         work: impl FnOnce(&Analysis) -> Result<Answer> + Send + 'static,
     ) -> Result<Answer> {
-        let _turn = self.computing.acquire().await;
+        let _guard = self.computing.acquire().await;
         self.apart(work).await
     }
 
@@ -146,9 +146,9 @@ impl Shared {
     }
 
     pub(super) async fn emulate(&self, muscle: String) -> Result<Answer> {
-        let (fresh, words) = self.apart(move |_| Connected::emulate(&muscle)).await?;
+        let (fresh, description) = self.apart(move |_| Connected::emulate(&muscle)).await?;
         self.order(Order::Replace(Box::new(fresh))).await?;
-        Ok(Answer::Emulated(Emulated { controller: words }))
+        Ok(Answer::Emulated(Emulated { controller: description }))
     }
 
     /// Carries out what the page posted.

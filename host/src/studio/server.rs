@@ -255,18 +255,22 @@ async fn order(State(shared): State<Shared>, request: Request) -> Response {
 }
 
 #[derive(Deserialize)]
-struct Named {
+struct UploadQuery {
     name: String,
 }
 
-async fn upload(State(shared): State<Shared>, Query(named): Query<Named>, request: Request) -> Response {
+async fn upload(
+    State(shared): State<Shared>,
+    Query(query): Query<UploadQuery>,
+    request: Request,
+) -> Response {
     if !has_token(request.headers(), &shared.token) {
         return without_token();
     }
     let (send, mut pieces) = tokio::sync::mpsc::channel(PIECES);
     let analysis = Arc::clone(&shared.analysis);
     let stored = tokio::task::spawn_blocking(move || {
-        analysis.upload(&named.name, std::iter::from_fn(|| pieces.blocking_recv()))
+        analysis.upload(&query.name, std::iter::from_fn(|| pieces.blocking_recv()))
     });
     let mut body = request.into_body().into_data_stream();
     let mut sent = 0_u64;

@@ -274,7 +274,7 @@ fn the_path_of_a_vent_only_vents_and_only_for_the_page() {
     assert!(studio.press_vent().contains("no controller is connected"));
     let host = studio.shared.vent_path.origin.strip_prefix("http://").unwrap();
     let right = &studio.shared.vent_path.token;
-    for (head, body, status) in [
+    for (header, body, status) in [
         (format!("POST /vent HTTP/1.1\r\nHost: {host}\r\nOrigin: http://evil.example"), &**right, "403"),
         (format!("POST /vent HTTP/1.1\r\nHost: evil.example\r\nX: {host}"), right, "403"),
         (format!("POST /vent HTTP/1.1\r\nHost: {host}"), "0000", "403"),
@@ -284,11 +284,11 @@ fn the_path_of_a_vent_only_vents_and_only_for_the_page() {
         let mut stream = TcpStream::connect(host).unwrap();
         stream.set_read_timeout(Some(HOPELESS)).unwrap();
         let count = studio.shared.vent.count();
-        write!(stream, "{head}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{body}", body.len())
+        write!(stream, "{header}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{body}", body.len())
             .unwrap();
         let mut answer = String::new();
         let _ = stream.read_to_string(&mut answer);
-        assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{head}: {answer}");
+        assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{header}: {answer}");
         assert_eq!(studio.shared.vent.count(), count);
     }
 }

@@ -56,7 +56,7 @@ fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
             BenchName::Gravity => m.parameters[0] / 1e-2,
             _ => m.parameters[0] / 2e-3,
         };
-        assert!(size.abs() < 1.0, "{}: {}", m.fault.info().name, m.words);
+        assert!(size.abs() < 1.0, "{}: {}", m.fault.info().name, m.text);
     }
     let mut faulty = bench();
     faulty.instruments.force.gain = 0.03;
@@ -78,16 +78,16 @@ fn every_fault_is_measured_within_its_interval_and_none_where_there_is_none() {
         let m = checks.measured().iter().find(|m| m.fault == fault).expect("measured");
         let std = m.deviations[at].expect("varied");
         let off = (m.parameters[at] - truth).abs();
-        assert!(m.is_sure(), "{}", m.words);
-        assert!(off < 3.0 * std + 0.01 * truth.abs(), "{}: {} for {truth}", m.words, m.parameters[at]);
-        assert!(std < 0.1 * truth.abs(), "{}: {std} of {truth}", m.words);
+        assert!(m.is_sure(), "{}", m.text);
+        assert!(off < 3.0 * std + 0.01 * truth.abs(), "{}: {} for {truth}", m.text, m.parameters[at]);
+        assert!(std < 0.1 * truth.abs(), "{}: {std} of {truth}", m.text);
     }
     // Alone: a weight in the load path loads the frame, and shows in what the rigid bar reads.
     let mut heavy = bench();
     heavy.rig.weight = 3.0;
     let checks = read(&heavy);
     let m = checks.measured().iter().find(|m| m.fault == BenchName::Gravity).expect("measured");
-    assert!(m.is_sure() && (m.parameters[0] + 3.0 / 9.806_65).abs() < 1e-2, "{}", m.words);
+    assert!(m.is_sure() && (m.parameters[0] + 3.0 / 9.806_65).abs() < 1e-2, "{}", m.text);
 }
 
 #[test]

@@ -59,7 +59,7 @@ fn nested_matlab(depth: usize) -> Vec<u8> {
         padded.resize(data.len().next_multiple_of(8), 0);
         [&kind.to_le_bytes()[..], &(data.len() as u32).to_le_bytes(), &padded].concat()
     };
-    let head = |class: u32| {
+    let header = |class: u32| {
         [
             element(6, &[class.to_le_bytes(), [0; 4]].concat()),
             element(5, &[1_u32.to_le_bytes(), 1_u32.to_le_bytes()].concat()),
@@ -67,9 +67,9 @@ fn nested_matlab(depth: usize) -> Vec<u8> {
         ]
         .concat()
     };
-    let cell = head(1);
+    let cell = header(1);
     // Each header states the length of all that it contains.
-    let innermost = [head(6), element(9, &1.0_f64.to_le_bytes())].concat();
+    let innermost = [header(6), element(9, &1.0_f64.to_le_bytes())].concat();
     let mut file = b"MATLAB 5.0 MAT-file".to_vec();
     file.resize(126, b' ');
     file.extend(b"IM");

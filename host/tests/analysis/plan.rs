@@ -132,9 +132,9 @@ fn lengths_set_by_hand_come_back_from_where_the_muscle_hangs_slack() {
     // 30 % of what the rig allows is more than this muscle's free stroke of about 3 mm.
     let rig = Rig::parse("axis = 'prompt'\nstroke_max_mm = 12.0\n").unwrap();
     let mut engine = Engine::new(muscle, rig, Purpose::Fit, 900.0).unwrap();
-    let course = simulate(&mut engine, &mut VirtualBench::new(&spec), None).unwrap();
-    let slack = course.iter().filter(|d| d.spoiled.contains(&Spoiled::Slack)).count();
-    assert!(slack >= 1, "the first length is too short: {course:#?}");
+    let steps = simulate(&mut engine, &mut VirtualBench::new(&spec), None).unwrap();
+    let slack = steps.iter().filter(|d| d.spoiled.contains(&Spoiled::Slack)).count();
+    assert!(slack >= 1, "the first length is too short: {steps:#?}");
     let held: Vec<(f64, f64)> = engine
         .steps()
         .iter()

@@ -160,7 +160,7 @@ fn the_thesis_raw_form_comes_in_with_its_units() {
     close(recording.force.as_ref().unwrap()[0], 80.0, 1e-3);
     close(recording.force.as_ref().unwrap()[50], 20.0, 1e-3);
     close(recording.stroke[0], 0.0, 0.15e-3);
-    assert_eq!(Motion::of(recording).turns.len(), 2);
+    assert_eq!(Motion::of(recording).reversals.len(), 2);
 }
 
 /// Effective dimensions are found, not stumbled upon: what two of three runs give hardly depends on which two.

@@ -31,7 +31,10 @@ fn on_one_piece_a_search_needs_no_bracket() {
             };
             let found = from(guess).expect("on the piece");
             assert!((found.pressure.pascals() - answer).abs() < 1e-3, "{found:?}, not {answer}");
-            assert!(found.reach == Reach::Reached && (2..=4).contains(&found.steps), "{found:?}");
+            assert!(
+                found.attainability == Attainability::Attainable && (2..=4).contains(&found.steps),
+                "{found:?}"
+            );
             let there = from(answer).expect("on the piece");
             assert_eq!(there.steps, 1, "{there:?} from the answer itself");
             let of_both =
@@ -65,7 +68,10 @@ fn a_search_within_a_bracket_is_as_quick_where_the_force_rises() {
         let (wanted, _) = base.force_and_slope(answer);
         let found = solve(&mut base, wanted, Pressure::from_pascals(guess), &fine(&m));
         assert!((found.pressure.pascals() - answer).abs() < 1e-3, "{found:?}, not {answer}");
-        assert!(found.reach == Reach::Reached && (2..=7).contains(&found.steps), "{found:?} from {guess}");
+        assert!(
+            found.attainability == Attainability::Attainable && (2..=7).contains(&found.steps),
+            "{found:?} from {guess}"
+        );
         let there = solve(&mut base, wanted, Pressure::from_pascals(answer), &fine(&m));
         assert_eq!((there.pressure.pascals(), there.steps), (answer, 1));
     }
@@ -102,7 +108,7 @@ fn a_search_that_has_not_ended_after_its_most_steps_does_not_claim_an_answer() {
     let found = solve(&mut Jumping, 0.0, Pressure::from_pascals(0.5), &Search { low, high, tolerance });
     assert_eq!(found.steps, MAX_STEPS);
     assert!((found.pressure.pascals() - 1.0 / 3.0).abs() < 1e-6);
-    assert_ne!(found.reach, Reach::Reached);
+    assert_ne!(found.attainability, Attainability::Attainable);
 }
 
 /// A root, on which Newton's method goes back and forth between two pressures without end.
@@ -125,7 +131,11 @@ fn a_step_back_to_a_pressure_that_was_tried_is_not_taken() {
     let [low, high, tolerance] = [-1.0, 1.0, 1e-9].map(Pressure::from_pascals);
     for guess in [0.25, -0.25] {
         let found = solve(&mut Root, 0.0, Pressure::from_pascals(guess), &Search { low, high, tolerance });
-        assert_eq!((found.pressure.pascals(), found.reach), (0.0, Reach::Reached), "{found:?} from {guess}");
+        assert_eq!(
+            (found.pressure.pascals(), found.attainability),
+            (0.0, Attainability::Attainable),
+            "{found:?} from {guess}"
+        );
         assert_eq!(found.steps, 3, "there, halfway back, and the end: {found:?}");
     }
 }
@@ -149,7 +159,7 @@ impl Curve<f64> for Flat {
 fn where_nothing_is_missed_on_a_flat_part_the_search_continues_upwards() {
     let [low, high, tolerance] = [0.0, 1.0, 1e-9].map(Pressure::from_pascals);
     let found = solve(&mut Flat, 0.0, Pressure::from_pascals(0.25), &Search { low, high, tolerance });
-    assert_eq!((found.pressure.pascals(), found.reach), (0.5, Reach::Reached));
+    assert_eq!((found.pressure.pascals(), found.attainability), (0.5, Attainability::Attainable));
 }
 
 #[test]
@@ -165,18 +175,18 @@ fn no_piece_is_assumed_where_effects_may_bend_the_force() {
 fn an_end_is_judged_by_what_was_missed_there() {
     // Missed, N, slope, N/Pa, and tolerance, Pa.
     let cases = [
-        (1.9e-3, 1e-3, 1.0, Reach::Reached),
-        (-1.9e-3, -1e-3, 1.0, Reach::Reached),
-        (0.0, 0.0, 1.0, Reach::Reached),
-        (1.9e-2, 1e-3, 10.0, Reach::Reached),
-        (2.1e-2, 1e-3, 10.0, Reach::BelowDeadband),
-        (-2.1e-3, 1e-3, 1.0, Reach::BeyondBlockedForce),
-        (1.0, 0.0, 1.0, Reach::NotRising),
-        (-1.0, -1e-3, 1.0, Reach::NotRising),
-        (f64::NAN, f64::NAN, 1.0, Reach::NotRising),
+        (1.9e-3, 1e-3, 1.0, Attainability::Attainable),
+        (-1.9e-3, -1e-3, 1.0, Attainability::Attainable),
+        (0.0, 0.0, 1.0, Attainability::Attainable),
+        (1.9e-2, 1e-3, 10.0, Attainability::Attainable),
+        (2.1e-2, 1e-3, 10.0, Attainability::BelowDeadband),
+        (-2.1e-3, 1e-3, 1.0, Attainability::BeyondBlockedForce),
+        (1.0, 0.0, 1.0, Attainability::NotRising),
+        (-1.0, -1e-3, 1.0, Attainability::NotRising),
+        (f64::NAN, f64::NAN, 1.0, Attainability::NotRising),
     ];
-    for (miss, slope, tolerance, reach) in cases {
-        assert_eq!(judge(miss, slope, tolerance), reach, "{miss} N at {slope} N/Pa");
+    for (miss, slope, tolerance, attainability) in cases {
+        assert_eq!(judge(miss, slope, tolerance), attainability, "{miss} N at {slope} N/Pa");
     }
 }
 

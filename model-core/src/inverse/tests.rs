@@ -14,7 +14,7 @@ proptest! {
         let stroke = Length::from_millimetres(mm);
         let force = m.force(Pressure::from_pascals(p), stroke, f64::from(s));
         let found = m.pressure_for(force, &m.at_stroke(stroke), f64::from(s), Pressure::from_pascals(guess), &m.search());
-        prop_assert_eq!(found.reach, Reach::Reached);
+        prop_assert_eq!(found.attainability, Attainability::Attainable);
         prop_assert!((found.pressure.pascals() - p).abs() < 2.0, "{:?} for {}", found, p);
     }
 
@@ -55,15 +55,15 @@ proptest! {
         let search = m.search();
         let found = m.pressure_for(Force::from_newtons(wanted), &at_stroke, s, Pressure::from_pascals(guess), &search);
         let miss = at(found.pressure) - wanted;
-        match found.reach {
+        match found.attainability {
             // The slope that is reported is that of the last step; on a bend it differs from the one at the answer.
-            Reach::Reached => {
+            Attainability::Attainable => {
                 let slope = m.parts(&at_stroke, found.pressure).slope(s).abs().max(found.slope.abs());
                 prop_assert!(miss.abs() <= 2.0 * slope + 1e-6, "{found:?} misses by {miss} N");
             }
-            Reach::BeyondBlockedForce => prop_assert!(miss < 0.0 && found.pressure == search.high, "{found:?}"),
-            Reach::BelowDeadband => prop_assert!(miss > 0.0 && found.pressure == search.low, "{found:?}"),
-            Reach::NotRising => prop_assert!(found.slope <= 0.0 || found.steps == MAX_STEPS, "{found:?}"),
+            Attainability::BeyondBlockedForce => prop_assert!(miss < 0.0 && found.pressure == search.high, "{found:?}"),
+            Attainability::BelowDeadband => prop_assert!(miss > 0.0 && found.pressure == search.low, "{found:?}"),
+            Attainability::NotRising => prop_assert!(found.slope <= 0.0 || found.steps == MAX_STEPS, "{found:?}"),
         }
     }
 }
@@ -85,15 +85,15 @@ fn unreachable_forces_are_reported() {
     let m = muscle();
     let at_stroke = m.at_stroke(Length::ZERO);
     let at = |n| m.pressure_for(Force::from_newtons(n), &at_stroke, 0.0, Pressure::ZERO, &m.search());
-    assert_eq!(at(1.0e4).reach, Reach::BeyondBlockedForce);
+    assert_eq!(at(1.0e4).attainability, Attainability::BeyondBlockedForce);
     assert_eq!(at(1.0e4).pressure, m.max_pressure());
-    assert_eq!(at(-1.0e4).reach, Reach::BelowDeadband);
+    assert_eq!(at(-1.0e4).attainability, Attainability::BelowDeadband);
     assert_eq!(at(-1.0e4).pressure, Pressure::ZERO);
     let past_neutral = m.at_stroke(Length::from_millimetres(30.0));
     let found = m.pressure_for(Force::from_newtons(50.0), &past_neutral, 0.0, Pressure::ZERO, &m.search());
-    assert_eq!(found.reach, Reach::NotRising);
+    assert_eq!(found.attainability, Attainability::NotRising);
     let nan = m.pressure_for(Force::from_newtons(f64::NAN), &at_stroke, 0.0, Pressure::ZERO, &m.search());
-    assert_ne!(nan.reach, Reach::Reached);
+    assert_ne!(nan.attainability, Attainability::Attainable);
     assert!(nan.pressure.is_finite());
 }
 
@@ -112,7 +112,7 @@ fn the_pressure_is_smooth_where_one_piece_of_the_table_ends() {
             let step = 100.0 * parts.slope(s);
             let at = |wanted: f64| {
                 let found = m.pressure_for(Force::from_newtons(wanted), &at_stroke, s, node, &search);
-                assert_eq!(found.reach, Reach::Reached, "{wanted} N at {mm} mm");
+                assert_eq!(found.attainability, Attainability::Attainable, "{wanted} N at {mm} mm");
                 found.pressure.pascals()
             };
             let [before, there, after] = [-1.0, 0.0, 1.0].map(|n| at(parts.force(s) + n * step));

@@ -37,12 +37,12 @@ fn gain(subject: &Subject, law: Law, hz: f64) -> f64 {
     let ticks = ((2.0 * hz).ceil() / hz / f64::from(TICK_S)).round() as u32;
     let (mut sine, mut cosine) = (0.0, 0.0);
     for tick in 0..2 * ticks {
-        let turn = TAU * hz * f64::from(tick) * f64::from(TICK_S);
-        control.point(SetPoint::Force(mean + (amplitude * turn.sin()) as f32));
+        let phase = TAU * hz * f64::from(tick) * f64::from(TICK_S);
+        control.point(SetPoint::Force(mean + (amplitude * phase.sin()) as f32));
         let now = control.run(1)[0];
         if tick >= ticks {
-            sine += (now.force - f64::from(mean)) * turn.sin();
-            cosine += (now.force - f64::from(mean)) * turn.cos();
+            sine += (now.force - f64::from(mean)) * phase.sin();
+            cosine += (now.force - f64::from(mean)) * phase.cos();
         }
     }
     2.0 * sine.hypot(cosine) / f64::from(ticks) / amplitude

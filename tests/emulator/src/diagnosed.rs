@@ -27,7 +27,7 @@ pub struct Case {
     /// What is concealed, by its name in the catalogue.
     pub effect: &'static str,
     /// What it is as text, with its size.
-    pub words: String,
+    pub description: String,
     /// The muscle without it.
     pub plain: MuscleSpec,
     /// The muscle with it.
@@ -105,9 +105,9 @@ pub fn cases() -> Vec<Case> {
             .map(|(t, part)| (t, 1e3 * part * x))
             .to_vec(),
     };
-    type Course<'a> = &'a dyn Fn(f64) -> Motion;
+    type Displacement<'a> = &'a dyn Fn(f64) -> Motion;
     type Setpoint = fn(f64) -> Vec<Stretch>;
-    let all: [(&'static str, u64, Conceal, Course<'_>, Setpoint); 4] = [
+    let all: [(&'static str, u64, Conceal, Displacement<'_>, Setpoint); 4] = [
         ("coulomb-friction", 101, seal, &swing(0.2), sine_and_steps),
         ("viscous-damping", 102, viscous, &swing(0.5), sine_and_steps),
         ("stress-relaxation", 103, relaxation, &path, sine_and_steps),
@@ -117,8 +117,8 @@ pub fn cases() -> Vec<Case> {
         let plain = simple(seed);
         let (blocked, x, v) = sizes(&plain);
         let mut spec = plain.clone();
-        let words = conceal(&mut spec, blocked, x, v);
-        Case { effect, words, plain, spec, motion: motion(x), setpoint: setpoint(blocked), blocked }
+        let description = conceal(&mut spec, blocked, x, v);
+        Case { effect, description, plain, spec, motion: motion(x), setpoint: setpoint(blocked), blocked }
     })
     .to_vec()
 }
@@ -195,7 +195,7 @@ fn sine_and_steps(blocked: f64) -> Vec<Stretch> {
     vec![Stretch { wanted: Wanted::Wave(sine), ticks: 2_600, unjudged: 300 }, step(0.45 * b), step(0.28 * b)]
 }
 
-/// One force for a whole course of [`inching`], to and back, after a second in which it fills the muscle.
+/// One force for a whole motion by [`inching`], to and back, after a second in which it fills the muscle.
 fn steady(blocked: f64) -> Vec<Stretch> {
     let point = SetPoint::Force(0.35 * blocked as f32);
     vec![Stretch { wanted: Wanted::Point(point), ticks: 21_000, unjudged: 1_000 }]
@@ -253,7 +253,7 @@ pub fn in_emulator(spec: &MuscleSpec, case: &Case, tables: &[&MuscleTable]) -> R
                 tracking::compare(FeedForward::Table, 0.0, 0.0)(s);
                 (s.regulator, s.limits) = (with.regulator, with.limits);
             });
-            // Motion and course begin together, on a muscle that has not waited, however long all this took.
+            // Motion and setpoint begin together, on a muscle that has not waited, however long all this took.
             station.with(|bench| *bench.plant() = start);
             let samples = tracking::run(&mut client, Mode::Force, &case.setpoint);
             Ok(100.0 * tracking::rms(&samples, tracking::force) / case.blocked)

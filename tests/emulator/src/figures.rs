@@ -35,7 +35,7 @@ pub struct Figure {
 /// # Panics
 /// When the image cannot be built, or does not come to its end.
 pub fn count() -> Result<Vec<Figure>, Skipped> {
-    let image = machine::figures_image()?;
+    let image = machine::instruction_counts_image()?;
     let output = Command::new("qemu-system-arm")
         .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "null"])
         .args(["-semihosting-config", "enable=on,target=native", "-icount", "shift=0", "-kernel"])

@@ -134,7 +134,7 @@ pub fn address_of(image: &Path, name: &str) -> u32 {
 ///
 /// # Panics
 /// With the reason when it cannot be built.
-pub fn figures_image() -> Result<PathBuf, Skipped> {
+pub fn instruction_counts_image() -> Result<PathBuf, Skipped> {
     static ONCE: OnceLock<Result<(), String>> = OnceLock::new();
     available()?;
     Ok(built(&["--figures", "mps2-an386"], "mps2-an386-figures.elf", &ONCE))

@@ -93,8 +93,8 @@ impl<S> Watched<S> {
     }
 
     /// Looks at the bench itself.
-    pub fn with<R>(&self, look: impl FnOnce(&mut S) -> R) -> R {
-        look(&mut self.inner().station)
+    pub fn with<R>(&self, read: impl FnOnce(&mut S) -> R) -> R {
+        read(&mut self.inner().station)
     }
 }
 

@@ -33,7 +33,7 @@ pub enum Load {
 
 /// the setpoint, around a mean by an amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Course {
+pub enum Profile {
     /// Up and down immediately, a second at each.
     Steps,
     /// Up and down in a second each, half a second at each end.
@@ -57,16 +57,16 @@ pub enum Law {
 
 /// The laws, in the order of the report's columns.
 pub const LAWS: [Law; 4] = [Law::Table, Law::Trimmed, Law::Gaylord, Law::Feedback];
-/// The courses, in the order of the report's rows.
-pub const COURSES: [Course; 8] = [
-    Course::Steps,
-    Course::Ramps,
-    Course::Sine(0.1),
-    Course::Sine(0.3),
-    Course::Sine(0.5),
-    Course::Sine(1.0),
-    Course::Sine(2.0),
-    Course::Sine(5.0),
+/// The profiles, in the order of the report's rows.
+pub const PROFILES: [Profile; 8] = [
+    Profile::Steps,
+    Profile::Ramps,
+    Profile::Sine(0.1),
+    Profile::Sine(0.3),
+    Profile::Sine(0.5),
+    Profile::Sine(1.0),
+    Profile::Sine(2.0),
+    Profile::Sine(5.0),
 ];
 
 impl Load {
@@ -80,7 +80,7 @@ impl Load {
     }
 }
 
-impl Course {
+impl Profile {
     /// As text.
     pub fn name(self) -> String {
         match self {
@@ -241,21 +241,22 @@ impl Subject {
     }
 
     /// True error of a case, rms in % of blocked force or of free stroke.
-    pub fn error(&self, mode: Mode, load: Load, course: Course, law: Law) -> f64 {
-        100.0 * closed_loop::rms(&self.run(mode, load, course, law), |tick| of(mode, tick)) / self.scale(mode)
+    pub fn error(&self, mode: Mode, load: Load, profile: Profile, law: Law) -> f64 {
+        100.0 * closed_loop::rms(&self.run(mode, load, profile, law), |tick| of(mode, tick))
+            / self.scale(mode)
     }
 
-    fn run(&self, mode: Mode, load: Load, course: Course, law: Law) -> Vec<Tick> {
+    fn run(&self, mode: Mode, load: Load, profile: Profile, law: Law) -> Vec<Tick> {
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let settings = self.settings(law, load);
         let mut control = Loop::start(&bench, &self.motion(load), &self.table, settings, mode);
         let (mean, amplitude) = self.setpoint_range(mode);
         control.point(point(mode, mean));
         control.run(1_500);
-        control.wave(course.reference(mean, amplitude));
+        control.wave(profile.reference(mean, amplitude));
         // The way into the wave is not judged.
         control.run(1_000);
-        control.run(course.ticks())
+        control.run(profile.ticks())
     }
 
     /// How a force is held that stays the same, after a step.
@@ -291,8 +292,8 @@ impl Subject {
         control.run(1_500);
         let mut ticks = Vec::new();
         for tick in 0..5_000_u32 {
-            let turn = std::f32::consts::TAU * hz * tick as f32 * TICK_S;
-            control.point(SetPoint::Force(mean + amplitude * turn.sin()));
+            let phase = std::f32::consts::TAU * hz * tick as f32 * TICK_S;
+            control.point(SetPoint::Force(mean + amplitude * phase.sin()));
             ticks.extend(control.run(1));
         }
         100.0 * closed_loop::rms(&ticks[1_000..], |tick| tick.force) / self.blocked()
@@ -300,8 +301,8 @@ impl Subject {
 
     /// What the regulator itself leaves, rms in %: its fastest change of pressure, for a controller that begins when it is queried and
     /// inverts lag and line, and its ripple and drift at a command that does not move.
-    pub fn limit(&self, mode: Mode, load: Load, course: Course) -> f64 {
-        let ticks = self.run(mode, load, course, Law::Table);
+    pub fn limit(&self, mode: Mode, load: Load, profile: Profile) -> f64 {
+        let ticks = self.run(mode, load, profile, Law::Table);
         let bench = BenchSpec::laboratory(self.spec.clone(), 11);
         let slope = f64::from(self.slope(load));
         // The fastest change of force is the fastest of pressure times the braid's area; of stroke, that against the spring.
@@ -347,7 +348,13 @@ fn point(mode: Mode, value: f32) -> SetPoint {
 ///
 /// # Panics
 /// When the board refuses.
-pub fn in_qemu(subject: &Subject, mode: Mode, load: Load, course: Course, law: Law) -> Result<f64, Skipped> {
+pub fn in_qemu(
+    subject: &Subject,
+    mode: Mode,
+    load: Load,
+    profile: Profile,
+    law: Law,
+) -> Result<f64, Skipped> {
     let bench = BenchSpec::laboratory(subject.spec.clone(), 11);
     let station = PlantStation::new(bench, vec![subject.motion(load)], 1e-3);
     let folder = Folder::new();
@@ -357,11 +364,11 @@ pub fn in_qemu(subject: &Subject, mode: Mode, load: Load, course: Course, law: L
     upload(&mut client, Side::Agonist, &subject.table);
     tracking::set(&mut client, |settings| *settings = subject.settings(law, load));
     let (mean, amplitude) = subject.setpoint_range(mode);
-    let ticks = u64::from(course.ticks()) / 2;
+    let ticks = u64::from(profile.ticks()) / 2;
     let stretches = [
         Stretch { wanted: Wanted::Point(point(mode, mean)), ticks: 1_000, unjudged: 1_000 },
         Stretch {
-            wanted: Wanted::Wave(course.reference(mean, amplitude)),
+            wanted: Wanted::Wave(profile.reference(mean, amplitude)),
             ticks: 500 + ticks,
             unjudged: 500,
         },

@@ -53,8 +53,8 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
     let folder = Folder::new();
     let station = station();
     let Some(machine) = board(&folder, &station, false) else { return };
-    let heard = Arc::new(AtomicUsize::new(0));
-    let (note, clock) = (heard.clone(), station.clone());
+    let received = Arc::new(AtomicUsize::new(0));
+    let (note, clock) = (received.clone(), station.clone());
     let counted = Box::new(move |_: &mut Vec<u8>| note.store(clock.periods(), Ordering::Relaxed));
     let line = Line::tcp(&machine, counted, line::clean());
     killed_in_a_wave(&station, &line, &folder);
@@ -62,8 +62,8 @@ fn a_host_that_is_killed_during_a_wave_of_the_devices_own_stops_it() {
     station.until("the vent", |now| command(&station) == 0.0 || now > killed + 5_000);
     let vented = station.periods();
     station.until("it stays vented", |now| now > vented + 200);
-    let last_heard = heard.load(Ordering::Relaxed);
-    let after = station.since(last_heard);
+    let last_received = received.load(Ordering::Relaxed);
+    let after = station.since(last_received);
     let vented = after.iter().position(|exchange| exchange.command == 0.0);
     // The board's own count, which is reported below, begins when the frame is there: a busy machine takes its time to bring it.
     assert!(

@@ -91,8 +91,8 @@ fn a_campaign_with_a_testing_machine_on_serial_lines_is_killed_continues_and_ven
     assert!(status.success());
     let all = rows(&folder.join("c"));
     times(&all);
-    let course = document(folder);
-    assert_eq!(course["complete"], true, "{course:#}");
+    let document = document(folder);
+    assert_eq!(document["complete"], true, "{document:#}");
     let largest = all.iter().filter_map(|r| r.split(',').nth(2)?.parse::<f64>().ok()).fold(0.0, f64::max);
     assert!(largest > 1.0, "the machine moved the muscle: {largest} mm");
     assert!(folder.join("c/table.pam").exists() && folder.join("c/report.html").exists());

@@ -257,27 +257,27 @@ fn a_constant_setpoint_is_held_without_a_limit_cycle_with_and_without_a_moving_l
 /// The short form of `cargo run --release -p emulator-tests --bin tracking`, which writes the whole sweep.
 #[test]
 fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does_not_upset_it() {
-    use emulator_tests::sweep::{Course, Law, Load, Subject};
+    use emulator_tests::sweep::{Law, Load, Profile, Subject};
     let subject = Subject::of(presets::miniature());
     let cases = [
-        (Load::AtStroke, Course::Sine(1.0)),
-        (Load::Moved, Course::Ramps),
-        (Load::Moved, Course::Sine(1.0)),
-        (Load::Spring, Course::Ramps),
-        (Load::Spring, Course::Sine(0.5)),
+        (Load::AtStroke, Profile::Sine(1.0)),
+        (Load::Moved, Profile::Ramps),
+        (Load::Moved, Profile::Sine(1.0)),
+        (Load::Spring, Profile::Ramps),
+        (Load::Spring, Profile::Sine(0.5)),
     ];
-    for (load, course) in cases {
-        let [table, trimmed, gaylord] =
-            [Law::Table, Law::Trimmed, Law::Gaylord].map(|law| subject.error(Mode::Force, load, course, law));
-        let limit = subject.limit(Mode::Force, load, course);
+    for (load, profile) in cases {
+        let [table, trimmed, gaylord] = [Law::Table, Law::Trimmed, Law::Gaylord]
+            .map(|law| subject.error(Mode::Force, load, profile, law));
+        let limit = subject.limit(Mode::Force, load, profile);
         eprintln!(
-            "{load:?} {course:?}: table {table:.2}, trimmed {trimmed:.2}, Gaylord {gaylord:.2}, limit {limit:.2} %"
+            "{load:?} {profile:?}: table {table:.2}, trimmed {trimmed:.2}, Gaylord {gaylord:.2}, limit {limit:.2} %"
         );
-        assert!(trimmed < 0.5 && trimmed > 0.5 * limit && gaylord > 10.0 * table, "{load:?} {course:?}");
+        assert!(trimmed < 0.5 && trimmed > 0.5 * limit && gaylord > 10.0 * table, "{load:?} {profile:?}");
     }
     for factor in [0.8, 1.2] {
         let other = subject.misjudged(factor);
-        let error = other.error(Mode::Force, Load::Moved, Course::Sine(1.0), Law::Trimmed);
+        let error = other.error(Mode::Force, Load::Moved, Profile::Sine(1.0), Law::Trimmed);
         assert!(error < 0.5, "{error} % with moduli by {factor}");
     }
 }
@@ -286,12 +286,12 @@ fn force_with_table_and_trim_follows_within_a_percent_and_a_stiffer_bladder_does
 #[test]
 fn no_number_of_a_table_that_is_wrong_by_a_fifth_makes_the_loop_swing() {
     use emulator_tests::misjudged;
-    use emulator_tests::sweep::{Course, Law, Load, Subject};
+    use emulator_tests::sweep::{Law, Load, Profile, Subject};
     let subject = Subject::of(presets::miniature());
     let corners = misjudged::alone(&subject, 0.2).into_iter().chain(misjudged::worst(&subject, 0.2));
     for corner in corners {
         let other = corner.subject(&subject);
-        let error = other.error(Mode::Force, Load::Moved, Course::Sine(1.0), Law::Trimmed);
+        let error = other.error(Mode::Force, Load::Moved, Profile::Sine(1.0), Law::Trimmed);
         let still = other.still(Load::AtStroke, Law::Trimmed);
         eprintln!("{}: {:.2}, {error:.2} %, {still:.3?}", corner.name(), corner.slope_error);
         // The small-gain theorem.

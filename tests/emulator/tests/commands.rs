@@ -100,8 +100,9 @@ fn a_joint_takes_angle_and_stiffness_and_reports_the_available_range() {
     let mut client = Client::connect(port, PATIENCE).expect("it says hello");
     tracking::set(&mut client, pair::adjust);
     drop(client);
-    let ask = |course: &str, stiffness: &str, seconds: &str| {
-        let run = ["run", "--angle", course, "--stiffness", stiffness, "--seconds", seconds, "--rate", "250"];
+    let ask = |profile: &str, stiffness: &str, seconds: &str| {
+        let run =
+            ["run", "--angle", profile, "--stiffness", stiffness, "--seconds", seconds, "--rate", "250"];
         program::run(
             &stand.line,
             stand.folder.path(),
@@ -168,13 +169,13 @@ fn a_stroke_against_a_spring_and_a_force_from_a_file_are_followed_and_a_table_ro
         // 3 % of the free stroke: friction lets the last tenths of a millimetre go in small slips.
         assert!(error.sqrt() < 0.1e-3, "{} mm rms before {end} ms", error.sqrt() * 1e3);
     }
-    // A course of 1,200 points is more than the device holds: the program joins it by fewer.
-    let course: String = (0..1_200)
+    // A profile of 1,200 points is more than the device holds: the program joins it by fewer.
+    let profile: String = (0..1_200)
         .map(|n| format!("{},{}\n", 0.0025 * f64::from(n), 20.0 + 10.0 * (0.01 * f64::from(n)).sin()))
         .collect();
-    std::fs::write(stand.folder.path().join("course.csv"), format!("time_s,force_N\n{course}"))
+    std::fs::write(stand.folder.path().join("profile.csv"), format!("time_s,force_N\n{profile}"))
         .expect("a file");
-    let run = ["run", "--force", "@course.csv", "--seconds", "3", "-o", "force.csv", "--json"];
+    let run = ["run", "--force", "@profile.csv", "--seconds", "3", "-o", "force.csv", "--json"];
     let about = json(&stand.host(&run));
     assert_eq!(about["losses"]["samples"], 0);
     let path = stand.folder.path().join("force.csv");

@@ -46,12 +46,12 @@ fn pressure_follows_a_step_and_a_ramp_on_a_moving_muscle() {
         let mut control = start(&spec, &table, Mode::Pressure);
         for (from, to) in [(0.0, 300e3), (300e3, 500e3), (500e3, 300e3)] {
             control.point(SetPoint::Pressure(to));
-            let course: Vec<f64> = control.run(400).iter().map(|tick| tick.pressure).collect();
+            let response: Vec<f64> = control.run(400).iter().map(|tick| tick.pressure).collect();
             let gone = |pressure: f64| (pressure - from) / (f64::from(to) - from);
-            let late = course.iter().position(|p| gone(*p) > 0.9);
+            let late = response.iter().position(|p| gone(*p) > 0.9);
             let sign = (f64::from(to) - from).signum();
-            let beyond = course.iter().map(|p| sign * (p - f64::from(to))).fold(f64::MIN, f64::max);
-            let rest = course[250..].iter().map(|p| (p - f64::from(to)).abs()).fold(0.0, f64::max);
+            let beyond = response.iter().map(|p| sign * (p - f64::from(to))).fold(f64::MIN, f64::max);
+            let rest = response[250..].iter().map(|p| (p - f64::from(to)).abs()).fold(0.0, f64::max);
             eprintln!(
                 "{}: to {to} Pa: 90 % after {late:?} ms, overshoot {beyond:.0} Pa, then {rest:.0} Pa",
                 spec.name

@@ -56,7 +56,7 @@ struct Memory {
     turns: f64,
 }
 
-/// Residual and library, both with the base taken out, rows thinned.
+/// Residual and library, both with the base taken out, rows downsampled.
 fn projected(set: &Path, truth: &TrialTruth) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let force = truth.blocked_force;
     let l0 = truth.bench.muscle.geometry.rest_length;

@@ -107,7 +107,7 @@ fn evaluate(data: &Path, output: &Path, host: &Path, set: &Set) -> Result<Value,
 }
 
 /// Beginning of the page.
-const HEAD: &str = "# Real recordings of a commercial muscle\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; \
+const INTRODUCTION: &str = "# Real recordings of a commercial muscle\n\nWritten by `cargo run --release -p trials -- festo -o DIR --page docs/src/festo.md`; \
     nothing here is typed by hand. The recordings are isometric pressure staircases of a commercial 10 mm fluidic muscle: two sets of one \
     laboratory, eleven lengths, `../shared/data` (not part of the project). The program reads the columns only; its answers are compared \
     with the published description of the recordings. The muscle is never moved under pressure, so strokes, speeds and viscous friction \
@@ -116,7 +116,7 @@ const HEAD: &str = "# Real recordings of a commercial muscle\n\nWritten by `carg
 /// Columns of the diagnoses of one form.
 const ANSWERS: &str = "| set, muscle | verdict | named (probability, share explained) | where | held-out rows before → after, N |\n";
 
-/// Section on held-out recordings, and the head of its table.
+/// Section on held-out recordings, and the header of its table.
 const HELD_OUT: &str = "## Held-out recordings\n\nMean error of the settled points, in percent of the blocked force at the highest pressure. Each \
     run, each contraction, and each length is predicted from all others (`host evaluate`). The laboratory's published formula is compared \
     on the rows of the held-out runs; its coefficients were fitted to its own recordings, these included.\n\n\
@@ -131,7 +131,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         .collect();
     let diagnosed = in_order(&cases, |c| Ok(diagnose(data, output, host, *c)))?;
     let stock = stock::answer_of_both_sets(data, output, host)?;
-    let mut text = HEAD.to_owned();
+    let mut text = INTRODUCTION.to_owned();
     let _ = writeln!(text, "\n{}", tables_section(data)?.trim_end());
     let per_form = cases.len() / FORMS.len();
     for ((_, words), diagnosed) in FORMS.iter().zip(diagnosed.chunks(per_form)) {
@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn the_page_in_the_book_has_these_texts() {
         use festo_history::{DOCUMENTED, END_EFFECT, HEADING, INTRODUCTION as MEMORY};
-        let texts = [HEAD, ANSWERS, COMPARISON, HEADING, MEMORY, DOCUMENTED, END_EFFECT, HELD_OUT];
+        let texts = [INTRODUCTION, ANSWERS, COMPARISON, HEADING, MEMORY, DOCUMENTED, END_EFFECT, HELD_OUT];
         crate::book::contains("festo.md", &texts);
     }
 

@@ -16,7 +16,7 @@ struct Published {
     /// The kinds of documented findings that are about it.
     findings: &'static [&'static str],
     regions: &'static [&'static str],
-    words: &'static [&'static str],
+    keywords: &'static [&'static str],
 }
 
 const PUBLISHED: [Published; 5] = [
@@ -32,7 +32,7 @@ const PUBLISHED: [Published; 5] = [
         as_cause: &[],
         findings: &["first-run-deficit"],
         regions: &["recording", "cycle", "time"],
-        words: &[],
+        keywords: &[],
     },
     Published {
         what: "At constant pressure and length the force creeps, and remembers earlier runs",
@@ -40,7 +40,7 @@ const PUBLISHED: [Published; 5] = [
         as_cause: &[],
         findings: &["creep"],
         regions: &["hold-time", "time"],
-        words: &["at rest", "creep"],
+        keywords: &["at rest", "creep"],
     },
     Published {
         what: "A gap between filling and emptying that grows with contraction",
@@ -55,7 +55,7 @@ const PUBLISHED: [Published; 5] = [
         as_cause: &["log-creep"],
         findings: &["filling-emptying-gap"],
         regions: &["direction", "contraction"],
-        words: &[],
+        keywords: &[],
     },
     Published {
         what: "Ends that are not cylinders: the blocked force grows with the muscle's length",
@@ -63,7 +63,7 @@ const PUBLISHED: [Published; 5] = [
         as_cause: &[],
         findings: &[],
         regions: &[],
-        words: &["ends that are not"],
+        keywords: &["ends that are not"],
     },
     Published {
         what: "Mounted lengths by tape measure, to within a millimetre",
@@ -71,11 +71,11 @@ const PUBLISHED: [Published; 5] = [
         as_cause: &[],
         findings: &["slip"],
         regions: &["contraction"],
-        words: &["mounting"],
+        keywords: &["mounting"],
     },
 ];
 
-/// Paragraph on the published description, and the head of its table.
+/// Paragraph on the published description, and the header of its table.
 pub const COMPARISON: &str = "### Comparison with the published description\n\n\"Named\": one of the listed effects is named. \"In a set\": such an \
     effect is confusable with a named one. \"Located there\": the excess error is located on such a coordinate. \"Could be hidden\": such an \
     effect is possible at more than 1 % of the blocked force. \"Measured\": a finding of the report measures it, its interval excludes none, \
@@ -123,7 +123,7 @@ pub fn comparison(text: &mut String, diagnosed: &[(&str, &Answer, &Value)], stoc
         });
         let measured = who(&|_, v| !shown(v).is_empty());
         let placed = who(&|a, _| {
-            let remarked = a.remarks.iter().any(|r| w.words.iter().any(|x| r.contains(x)));
+            let remarked = a.remarks.iter().any(|r| w.keywords.iter().any(|x| r.contains(x)));
             remarked || a.regions.iter().any(|r| w.regions.contains(&r.coordinate.as_str()))
         });
         let hidden = who(&|a, v| {

@@ -40,20 +40,20 @@ fn found(history: &Value, kind: &str) -> bool {
     finding(history, kind).and_then(|f| f.get("found")).and_then(Value::as_bool) == Some(true)
 }
 
-/// First paragraph of the section, and the head of its table.
+/// First paragraph of the section, and the header of its table.
 pub const INTRODUCTION: &str = "Settled points. Each run is predicted from the other runs of the muscle. \"Static\": a curve for each mounting and \
     direction. \"With memory\": a curve for each mounting, with the memory of the bladder. Everything is chosen without the predicted run, \
     except the places of slips and, in sets with 20 runs and more, pause and earlier load. Root mean square in percent of the largest \
     force. A point is supported when another run of the mounting reaches its pressure. Intervals: 95 %, delete-one-run jackknife.\n\n\
     | set, muscle | static | with memory | change | supported points | with slips | relaxed share c | P_b, kPa | one time constant, times the error |\n";
 
-/// Paragraph on the documented findings, and the head of its table.
+/// Paragraph on the documented findings, and the header of its table.
 pub const DOCUMENTED: &str = "### Documented findings\n\nUnits of uncertainty are mountings or runs. \"Pooled\": one spread between mountings \
     for all muscles of a set. This is an assumption on the protocol: a muscle with two or three mountings has too few degrees of freedom \
     of its own.\n\n\
     | set, muscle | first filling low by, N | pooled | creep with memory | emptying over filling, shortened less full length, N | pooled | gap explained by | slips, bad runs |\n";
 
-/// Paragraph on the end effect, and the head of its table.
+/// Paragraph on the end effect, and the header of its table.
 pub const END_EFFECT: &str = "### End effect\n\nSlope of the force over pressure at full length near the highest pressures, \
     `A = A_0 (1 − ℓ/L0)`, over the lengths of a set. ℓ is the total length of the ends, which do not pull. Unit of uncertainty: \
     muscle.\n\n\

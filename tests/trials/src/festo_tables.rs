@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// Heading of the section.
 pub const HEADING: &str = "## Unseen runs through the table";
 
-/// First paragraph of the section, and the head of its table.
+/// First paragraph of the section, and the header of its table.
 pub const INTRODUCTION: &str = "Each run is predicted from the others by a table file (`.pam`) and the prediction of `host predict`, which carries the \
     memory through all runs in order; of the predicted run only pressure and time are used. Of more than twelve runs every twelfth is left out together. \
     \"Base\": the base model of `host fit` with the zero of the load cell. \"Static\": the same, with the contact of the bladder where the other runs follow it more closely. \"Memory\": `bladder-creep` in addition, and a load before the mountings that follow another where the other runs are predicted clearly better with one. Root mean square in percent \

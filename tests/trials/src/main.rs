@@ -355,7 +355,7 @@ fn specs(set: &str, what: &Set) -> Result<(u64, usize, Vec<spec::Spec>), Box<dyn
     let mut specs = if what.effects.is_empty() {
         spec::draw(seed, set, composition)
     } else {
-        spec::draw_of(seed, set, what.n, &spec::named(&what.effects)?)
+        spec::draw_of(seed, set, what.n, &spec::effects_by_name(&what.effects)?)
     };
     let drawn = specs.len();
     if let Some(only) = &what.protocol {

@@ -44,7 +44,7 @@ const MAPS: [Map; 2] = [
 ];
 
 /// Beginning of the page.
-const HEAD: &str = "# Static force maps\n\nWritten by `cargo run --release -p trials -- maps -o DIR --page docs/src/force-maps.md`; nothing here is typed \
+const INTRODUCTION: &str = "# Static force maps\n\nWritten by `cargo run --release -p trials -- maps -o DIR --page docs/src/force-maps.md`; nothing here is typed \
     by hand. M. Martens and I. Boblan measured the isometric force of two commercial muscles over pressure and length (Actuators 6 (2017) 33, doi \
     10.3390/act6040033, tables A1 and A2; erratum Actuators 7 (2018) 9). The maps are read second hand, from the comparison script of another \
     laboratory, in `../shared/data` (not part of the project).\n\nA map has no time and no direction. An import description with `[grid]` reads each \
@@ -53,7 +53,7 @@ const HEAD: &str = "# Static force maps\n\nWritten by `cargo run --release -p tr
     host evaluate --muscle dmsp10-250.toml --import force-map.toml --leave-out contractions dmsp10_250_force_map.csv\n```\n\n\
     `examples/muscles` and `examples/imports` hold both descriptions.\n";
 
-/// Paragraph on the errors, and the head of the table.
+/// Paragraph on the errors, and the header of the table.
 const ERRORS: &str = "## Errors\n\nMean and largest |F − F_model| over the cells, in percent of the largest force of the map. \"Between\": each inner \
     length (or pressure) is predicted from the others. \"Ends\": the longest and the shortest length, or the lowest and the highest pressure, \
     which is an extrapolation.\n\n\
@@ -96,14 +96,14 @@ type Cell = (f64, f64, f64);
 fn cells(path: &Path) -> Result<Vec<Cell>, Box<dyn Error>> {
     let text = std::fs::read_to_string(path)?;
     let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().ok_or("an empty map")?.split(',').collect();
+    let header: Vec<&str> = lines.next().ok_or("an empty map")?.split(',').collect();
     let length = |name: &str| -> Option<f64> {
         Some(1e-3 * name.strip_prefix("F_L")?.strip_suffix("mm_N")?.parse::<f64>().ok()?)
     };
     let mut all = Vec::new();
     for line in lines {
         let numbers: Vec<f64> = line.split(',').filter_map(|c| c.parse().ok()).collect();
-        for (name, force) in head.iter().zip(&numbers).skip(1) {
+        for (name, force) in header.iter().zip(&numbers).skip(1) {
             all.push((numbers[0], length(name).ok_or("a heading without a length")?, *force));
         }
     }
@@ -167,15 +167,16 @@ impl Tool<'_> {
         run_limited(&mut predict, Duration::from_secs(300))?;
         let text = std::fs::read_to_string(&out).map_err(|e| e.to_string())?;
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
-        let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
+        let header: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
         let column = |name: &str| {
-            head.iter()
+            header
+                .iter()
                 .position(|h| h.starts_with(name))
-                .ok_or(format!("no column {name} in {}", head.join(",")))
+                .ok_or(format!("no column {name} in {}", header.join(",")))
         };
         let (measured, model) = (column("force_N")?, column("force_model_N")?);
         let pressure = column("pressure_")?;
-        let scale = if head[pressure].ends_with("kPa") { 1e3 } else { 1.0 };
+        let scale = if header[pressure].ends_with("kPa") { 1e3 } else { 1.0 };
         for line in lines {
             let numbers: Vec<f64> = line.split(',').map(|c| c.parse().unwrap_or(f64::NAN)).collect();
             let at = numbers.get(pressure).copied().unwrap_or(f64::NAN) * scale;
@@ -220,7 +221,7 @@ fn row(text: &mut String, map: &str, model: &str, errors: &[Errors], force: f64)
 pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(output)?;
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut text = format!("{HEAD}\n{ERRORS}");
+    let mut text = format!("{INTRODUCTION}\n{ERRORS}");
     let mut stated = String::new();
     for map in &MAPS {
         let file = data.join("martens-boblan-tables").join(map.file);
@@ -249,7 +250,7 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
             row(&mut text, map.name, "their form, fitted here", &form, force);
         }
         let quoted = Form::quoted(coefficients, correction, nominal, muscle.rest_length());
-        let published = Published::named(map.published)?;
+        let published = Published::by_name(map.published)?;
         let mut others = [Errors::default(); 2];
         for (pressure, length, measured) in &cells {
             others[0].add(measured - quoted.force(*pressure, *length));
@@ -276,7 +277,7 @@ mod tests {
 
     #[test]
     fn the_page_in_the_book_has_these_texts() {
-        crate::book::contains("force-maps.md", &[HEAD, ERRORS, OTHERS]);
+        crate::book::contains("force-maps.md", &[INTRODUCTION, ERRORS, OTHERS]);
     }
 
     #[test]
@@ -285,7 +286,7 @@ mod tests {
         for map in &MAPS {
             let path = project.join(format!("examples/muscles/{}.toml", map.muscle));
             assert!(MuscleDescription::read(path).is_ok(), "{}", map.name);
-            assert!(Published::named(map.published).is_ok());
+            assert!(Published::by_name(map.published).is_ok());
         }
         assert!(pam_data::recording::Import::read(project.join("examples/imports/force-map.toml")).is_ok());
     }

@@ -1,7 +1,6 @@
 //! `trials reference`: changes put into later runs of real recordings, untouched pairs, and a cylinder whose seal was swapped; each asked of
 //! the diagnosis against a reference.
 
-mod course;
 mod cylinder;
 pub mod further;
 mod injection;
@@ -11,6 +10,7 @@ mod pairs;
 mod single_effects;
 mod staircases;
 mod tables;
+mod time_course;
 mod together;
 
 use std::collections::BTreeMap;

@@ -63,8 +63,8 @@ impl Residuals {
 
 fn of_table(text: &str) -> Vec<Vec<f64>> {
     let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
-    let at = |name: &str| head.iter().position(|c| *c == name);
+    let header: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
+    let at = |name: &str| header.iter().position(|c| *c == name);
     let (Some(p), Some(f)) = (at("pressure_kPa"), at("force_N")) else { return Vec::new() };
     // Unmeasured quantities differ between runs.
     let keys: Vec<usize> = ["rest_length_mm", "mounted_length_mm", "contraction", "run", "direction"]

@@ -54,8 +54,8 @@ fn read(data: &Path) -> Result<Vec<Muscle>, Box<dyn Error>> {
     let table =
         std::fs::read_to_string(dir.join("runs.csv")).map_err(|e| format!("{}: {e}", dir.display()))?;
     let mut lines = table.lines();
-    let head = lines.next().unwrap_or("");
-    let at = |name| column(head, name);
+    let header = lines.next().unwrap_or("");
+    let at = |name| column(header, name);
     let (file, rest, mounted, percent, run) = (
         at("file")?,
         at("rest_length_mm")?,
@@ -181,7 +181,7 @@ fn names(a: &Answer) -> Vec<&str> {
     a.missing.iter().map(|m| m.effect.as_str()).collect()
 }
 
-/// Beginning of the page, and the head of its table.
+/// Beginning of the page, and the header of its table.
 const INTRODUCTION: &str = "# Trials on real recordings\n\nWritten by `cargo run --release -p trials -- semi -o DIR --page \
     docs/src/proof-real.md`; nothing here is typed by hand. Effects are added to the columns of real recordings: isometric pressure \
     staircases of a commercial 10 mm muscle, six lengths, four mountings, three runs each (`../shared/data`). Their own physics is not \

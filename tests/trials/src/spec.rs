@@ -250,7 +250,7 @@ pub fn draw_of(seed: u64, family: &str, n: usize, lists: &[Vec<&'static str>]) -
 }
 
 /// Effects by name, two joined by a plus.
-pub fn named(lists: &[String]) -> Result<Vec<Vec<&'static str>>, String> {
+pub fn effects_by_name(lists: &[String]) -> Result<Vec<Vec<&'static str>>, String> {
     let known = |name: &str| {
         let all = SINGLES.iter().map(|s| s.0).chain(OUTSIDE);
         all.into_iter().find(|k| *k == name).ok_or(format!("no effect \"{name}\""))

@@ -32,16 +32,16 @@ const COLUMNS: [&str; 8] =
     ["muscle", "rest_length_mm", "mounted_length_mm", "run", "direction", "t_s", "pressure_kPa", "force_N"];
 
 /// Beginning of the page.
-const HEAD: &str = "# Muscles of one stock\n\nWritten by `cargo run --release -p trials -- stock -o DIR --page docs/src/stock.md`; nothing here is \
+const INTRODUCTION: &str = "# Muscles of one stock\n\nWritten by `cargo run --release -p trials -- stock -o DIR --page docs/src/stock.md`; nothing here is \
     typed by hand. The data are two sets of a commercial 10 mm fluidic muscle in eleven lengths: settled points of isometric pressure staircases \
     (`../shared/data`, not part of the project). Each set is diagnosed as one stock, then both together ([Fleets of muscles](fleets.md)).\n";
 
-/// Head of the table of laws.
+/// Header of the table of laws.
 const LAWS: &str = "## End effect\n\nParameters with 95 % intervals (Student's t, unit of uncertainty: muscle). The error is that on muscles that \
     were left out, rms in percent of the largest force of each.\n\n\
     | set | law | parameter | jackknife, standard error | error | answer |\n| --- | --- | --- | --- | --- | --- |\n";
 
-/// Head of the tables of mountings.
+/// Header of the tables of mountings.
 const MOUNTINGS: &str = "## Mounted lengths\n\nEach mounting is predicted without its own recordings; its muscle's other mountings are fitted. One number of its own \
     is fitted to the recordings of one direction and tried on those of the other. Root mean square over the mountings, N; in parentheses the root mean square of \
     the number. The published description states the mounted lengths to within a millimetre, by tape measure. A zero of the pressure sensor moves the curves as a \
@@ -49,14 +49,14 @@ const MOUNTINGS: &str = "## Mounted lengths\n\nEach mounting is predicted withou
     | set | mountings | nothing of its own | length | zero of the load cell | zero of the pressure sensor | scale of the load cell | answer |\n\
     | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
-/// Head of the table of mountings by muscle.
+/// Header of the table of mountings by muscle.
 const BY_MUSCLE: &str = "| set, muscle | nothing of its own | length | change |\n| --- | --- | --- | --- |\n";
 
-/// Head of the table of what is shared.
+/// Header of the table of what is shared.
 const SHARED: &str = "## What the muscles share\n\n\
     | set | contraction | force at the highest common pressure, N | emptying less filling, N | begins to pull at, kPa |\n| --- | --- | --- | --- | --- |\n";
 
-/// Head of the table of predictions.
+/// Header of the table of predictions.
 const UNSEEN: &str = "## Unseen contractions and unseen lengths\n\nMean error of the settled points in percent of the muscle's largest force (`host \
     evaluate --fit-geometry --fit-lengths --leave-out contractions`). \"Alone\": a table of the muscle without that contraction; the mean of the \
     other muscles' tables. \"Stock\": all muscles fitted together without what is predicted. \"Expected\": what the unknown length and zero of a mounting \
@@ -346,7 +346,8 @@ pub fn run(data: &Path, output: &Path, host: &Path) -> Result<(), Box<dyn Error>
         }
     }
     let [laws, mountings, shared, unseen] = parts;
-    let text = format!("{HEAD}\n{laws}\n{mountings}\n{muscles}\n{counts}\n{shared}\n{run_in}\n{unseen}");
+    let text =
+        format!("{INTRODUCTION}\n{laws}\n{mountings}\n{muscles}\n{counts}\n{shared}\n{run_in}\n{unseen}");
     std::fs::write(output.join("stock.md"), &text)?;
     println!("{text}");
     Ok(())

@@ -27,7 +27,7 @@ const GRANTED_US: u32 = 10_000;
 /// Before the first tick everything has the long time: the store is opened then.
 static WANTED: AtomicU32 = AtomicU32::new(LONG);
 static GRANTED: AtomicU32 = AtomicU32::new(LONG);
-static ASKED: AtomicU32 = AtomicU32::new(LONG);
+static REQUESTED: AtomicU32 = AtomicU32::new(LONG);
 
 /// Starts to watch.
 pub fn start() {
@@ -49,7 +49,7 @@ pub fn be_short() {
 /// tick and in force from the next.
 pub fn feed() {
     let wanted = WANTED.load(Ordering::Relaxed);
-    if ASKED.swap(wanted, Ordering::Relaxed) == wanted {
+    if REQUESTED.swap(wanted, Ordering::Relaxed) == wanted {
         KR.write(FEED);
         GRANTED.store(wanted, Ordering::Relaxed);
     } else {

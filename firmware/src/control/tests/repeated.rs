@@ -3,21 +3,21 @@
 use super::*;
 
 /// Ticks between two repetitions: several within the time after which pressure that does not follow is a fault.
-const AGAIN: u32 = 50;
+const REPEAT_TICKS: u32 = 50;
 
 /// Lets time pass with changed readings and repeats requests; returns the ticks until a fault is latched.
 fn ticks_to_a_fault(
     bench: &mut Bench,
     change: impl Fn(&mut Readings),
-    again: impl Fn(&mut Controller),
+    repeat: impl Fn(&mut Controller),
 ) -> Option<u32> {
     for ticks in 1..=1_000 {
         bench.pass_with(1, |now, _| change(now));
         if bench.latched().is_some() {
             return Some(ticks);
         }
-        if ticks % AGAIN == 0 {
-            again(&mut bench.controller);
+        if ticks % REPEAT_TICKS == 0 {
+            repeat(&mut bench.controller);
         }
     }
     None

@@ -79,17 +79,17 @@ fn pressure_is_within_five_percent_of_a_step_after_four_lags_and_then_within_the
         for to in [200e3, 400e3, 300e3, 200e3] {
             it.to(to);
             let to = f64::from(to);
-            let course: Vec<f64> = (0..400)
+            let response: Vec<f64> = (0..400)
                 .map(|_| {
                     it.pass(1);
                     it.muscle.pressure_pa()
                 })
                 .collect();
             let gone = |pressure: &f64| (pressure - from) / (to - from);
-            let most = course.iter().map(gone).fold(f64::MIN, f64::max);
-            let least = course[120..].iter().map(gone).fold(f64::MAX, f64::min);
+            let most = response.iter().map(gone).fold(f64::MIN, f64::max);
+            let least = response[120..].iter().map(gone).fold(f64::MAX, f64::min);
             assert!(most < 1.05 && least > 0.95, "{least} to {most} at {to} Pa, {ticks} ticks");
-            let rest = course[250..].iter().map(|p| (p - to).abs()).fold(0.0, f64::max);
+            let rest = response[250..].iter().map(|p| (p - to).abs()).fold(0.0, f64::max);
             assert!(rest < RESOLUTION_PA, "{rest} Pa at {to} Pa, {ticks} ticks");
             from = to;
         }

@@ -18,7 +18,7 @@ const MULLINS: (EffectName, &[f64]) = (EffectName::MullinsSoftening, &[0.4, 0.02
 const COULOMB: (EffectName, &[f64]) = (EffectName::CoulombFriction, &[1.0, 1.0]);
 
 /// Words that are written while a server with a table keeps what it must some times, and each memory is moved in between by a part.
-fn words(image: &[u8], times: u32, part: f32) -> usize {
+fn flash_words_written(image: &[u8], times: u32, part: f32) -> usize {
     let shared = Shared::new(Settings::default());
     let mut server = started(MockFlash::erased(), &shared);
     assert!(send(&mut server, &shared, image).is_ok());
@@ -37,15 +37,23 @@ fn words(image: &[u8], times: u32, part: f32) -> usize {
 #[test]
 fn memories_are_written_when_they_have_moved_and_only_where_one_must_last() {
     let lasting = with_effects(&[MULLINS]);
-    let none = words(&lasting, 0, 0.0);
-    let once = words(&lasting, 1, 0.0);
+    let none = flash_words_written(&lasting, 0, 0.0);
+    let once = flash_words_written(&lasting, 1, 0.0);
     assert!(once > none, "{once} words, {none} without keeping");
-    assert_eq!(words(&lasting, 6, 0.0), once, "nothing has moved");
-    assert_eq!(words(&lasting, 6, 1e-4), once, "hardly");
-    assert_eq!(words(&lasting, 6, 0.1) - none, 6 * (once - none), "each time");
+    assert_eq!(flash_words_written(&lasting, 6, 0.0), once, "nothing has moved");
+    assert_eq!(flash_words_written(&lasting, 6, 1e-4), once, "hardly");
+    assert_eq!(flash_words_written(&lasting, 6, 0.1) - none, 6 * (once - none), "each time");
     let fleeting = with_effects(&[COULOMB]);
-    assert_eq!(words(&fleeting, 6, 0.1), words(&fleeting, 0, 0.0), "nothing that must last");
-    assert_eq!(words(&image(40.0), 6, 0.1), words(&image(40.0), 0, 0.0), "no effects");
+    assert_eq!(
+        flash_words_written(&fleeting, 6, 0.1),
+        flash_words_written(&fleeting, 0, 0.0),
+        "nothing that must last"
+    );
+    assert_eq!(
+        flash_words_written(&image(40.0), 6, 0.1),
+        flash_words_written(&image(40.0), 0, 0.0),
+        "no effects"
+    );
 }
 
 #[test]
@@ -112,9 +120,9 @@ fn a_hello_is_answered_as_a_response_and_an_answer_not_at_all() {
 }
 
 /// Counts its restarts.
-struct Counted(std::sync::Arc<std::sync::atomic::AtomicU32>);
+struct RestartCounter(std::sync::Arc<std::sync::atomic::AtomicU32>);
 
-impl Update for Counted {
+impl Update for RestartCounter {
     fn status(&mut self, _: &mut UpdateStatus) -> Result<(), Refusal> {
         Err(Refusal::NotSupported)
     }
@@ -150,7 +158,7 @@ fn a_restart_reaches_what_takes_another_firmware() {
     let count = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
     let mut server = started(MockFlash::erased(), &shared);
     server.boot();
-    server.take_updates(std::boxed::Box::new(Counted(count.clone())));
+    server.take_updates(std::boxed::Box::new(RestartCounter(count.clone())));
     server.boot();
     assert_eq!(count.load(std::sync::atomic::Ordering::Relaxed), 1);
     // It stays with the server that starts again.

@@ -10,14 +10,14 @@ use crate::journal::{Chosen, Event, Journal};
 /// A recording has at least this many rows.
 const FEWEST_ROWS: u64 = 20;
 
-/// Gives an engine what the log of an earlier program holds; gives the course and the bench time so far.
+/// Gives an engine what the log of an earlier program holds; gives the steps and the bench time so far.
 pub(super) fn resume(
     engine: &mut Engine,
     journal: &Journal,
     muscle: &MuscleDescription,
 ) -> Result<(Vec<Done>, f64)> {
     let mut chosen: Option<Chosen> = None;
-    let mut course: Vec<Done> = Vec::new();
+    let mut steps: Vec<Done> = Vec::new();
     let mut spoiled = Vec::new();
     let mut spent = 0.0;
     for event in journal.events() {
@@ -39,7 +39,7 @@ pub(super) fn resume(
                 let Some(chosen) = chosen.take() else { continue };
                 engine.add(chosen.step, Some(read(&journal.folder().join(file), muscle)?));
                 spent += end_s - begin_s;
-                course.push(Done {
+                steps.push(Done {
                     chosen,
                     file: file.clone(),
                     rows: *rows,
@@ -54,7 +54,7 @@ pub(super) fn resume(
                 spent += chosen.expected_s;
                 let clock_s = (end_s - chosen.expected_s, *end_s);
                 let spoiled = Vec::new();
-                course.push(Done {
+                steps.push(Done {
                     chosen,
                     file: file.clone(),
                     rows: 0,
@@ -63,16 +63,16 @@ pub(super) fn resume(
                     finding: String::new(),
                 });
             }
-            Event::Finding { words, .. } => {
-                if let Some(last) = course.last_mut() {
-                    last.finding.clone_from(words);
+            Event::Finding { text, .. } => {
+                if let Some(last) = steps.last_mut() {
+                    last.finding.clone_from(text);
                 }
             }
             Event::Begin { .. } | Event::Ended { .. } => {}
         }
     }
-    if !course.is_empty() {
+    if !steps.is_empty() {
         engine.fit();
     }
-    Ok((course, spent))
+    Ok((steps, spent))
 }

@@ -19,7 +19,7 @@ use crate::wording;
 
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Planned {
+pub struct PlannedStep {
     /// The step.
     pub step: Step,
     /// Why, in one sentence.
@@ -34,7 +34,7 @@ pub struct Planned {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Steps in the order of recording: each has the most information per second after those before it.
-    pub steps: Vec<Planned>,
+    pub steps: Vec<PlannedStep>,
     /// Why it ends there, in one sentence.
     pub ends: String,
     /// Predicted standard error of the table before any of them, N; absent without a table.
@@ -107,10 +107,10 @@ impl Engine {
             };
             let begin = self.recordings.iter().chain(made.iter().filter_map(|m| m.1.as_ref()));
             let begin = begin.filter_map(|r| r.time.last()).copied().fold(0.0, f64::max);
-            let recording = expected(&best.step.course(&self.places), begin, &best.step.name());
+            let recording = expected(&best.step.profile(&self.places), begin, &best.step.name());
             made.push((best.step, Some(recording).filter(|r| !r.is_empty())));
             left -= best.seconds;
-            plan.steps.push(Planned {
+            plan.steps.push(PlannedStep {
                 step: best.step,
                 why: wording::why_with_gain(&self.reason(&best.step, &best.gain), &best.gain),
                 gain: best.gain,
@@ -118,7 +118,7 @@ impl Engine {
             });
         }
         if plan.steps.last().is_some_and(|p| p.step != CLOSING) {
-            plan.steps.push(Planned {
+            plan.steps.push(PlannedStep {
                 step: CLOSING,
                 why: wording::CLOSING.to_owned(),
                 gain: Gain::default(),
@@ -137,10 +137,10 @@ impl Engine {
         let rest = self.rank(further, &[]).steps.into_iter().map(|w| (w.step, wording::NO_TABLE.to_owned()));
         for (step, why) in first.chain(rest) {
             let seconds = self.seconds(&step);
-            let known = steps.iter().any(|p: &Planned| p.step.name() == step.name());
+            let known = steps.iter().any(|p: &PlannedStep| p.step.name() == step.name());
             if steps.len() < most && seconds <= left && !known {
                 left -= seconds;
-                steps.push(Planned { step, why, gain: Gain::default(), seconds });
+                steps.push(PlannedStep { step, why, gain: Gain::default(), seconds });
             }
         }
         Plan { steps, ends: wording::PLAN_AGAIN.to_owned(), error: None }

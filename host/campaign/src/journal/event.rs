@@ -99,7 +99,8 @@ pub enum Event {
         /// Its number.
         number: u32,
         /// As text.
-        words: String,
+        #[serde(rename = "words")]
+        text: String,
     },
     /// The campaign ended.
     Ended {

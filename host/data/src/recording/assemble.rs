@@ -117,7 +117,7 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
     };
     let mut keys: HashMap<usize, TextColumn> = HashMap::new();
     for (i, role) in plan.roles.iter().enumerate() {
-        let words = std::mem::take(&mut rows.texts[i]);
+        let texts = std::mem::take(&mut rows.texts[i]);
         match role {
             Role::Quantity(q) => {
                 let mut values = std::mem::take(&mut rows.numbers[i]);
@@ -129,7 +129,7 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
             Role::Coded(q, values) => {
                 let name = &job.names[plan.wanted[i].index];
                 let code = |row: usize| {
-                    let word = words.get(row).trim();
+                    let word = texts.get(row).trim();
                     values.get(word).copied().ok_or_else(|| {
                         let known: Vec<_> = values.keys().map(|k| format!("`{k}`")).collect();
                         Error::new(
@@ -144,10 +144,10 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
                 };
                 table.quantities.insert(*q, (0..rows.rows).map(code).collect::<Result<_>>()?);
             }
-            Role::Split(n) => table.splits[*n] = words,
-            Role::Filter(n) => table.filters[*n] = words,
+            Role::Split(n) => table.splits[*n] = texts,
+            Role::Filter(n) => table.filters[*n] = texts,
             Role::Key(n) => {
-                keys.insert(*n, words);
+                keys.insert(*n, texts);
             }
         }
     }
@@ -216,21 +216,21 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
     }
     let mut keep = vec![true; rows];
     let mut rest_length = false;
-    for ((name, value), words) in job.filters.iter().zip(&table.filters) {
+    for ((name, value), texts) in job.filters.iter().zip(&table.filters) {
         rest_length |= value.is_of_length();
         let fits = |word: &String| passes(job, name, value, word);
-        let verdicts: Vec<bool> = words.words.iter().map(fits).collect::<Result<_>>()?;
-        for (kept, code) in keep.iter_mut().zip(&words.codes) {
+        let verdicts: Vec<bool> = texts.dictionary.iter().map(fits).collect::<Result<_>>()?;
+        for (kept, code) in keep.iter_mut().zip(&texts.codes) {
             *kept &= verdicts[*code as usize];
         }
     }
     if keep.iter().any(|k| *k) {
         return Ok(Some(keep));
     }
-    let list = |(words, (name, _)): (&TextColumn, &(String, Value))| {
-        let mut values: Vec<String> = words.words.iter().take(LISTED_VALUES).cloned().collect();
-        if words.words.len() > LISTED_VALUES {
-            values.push(format!("and {} more", words.words.len() - LISTED_VALUES));
+    let list = |(texts, (name, _)): (&TextColumn, &(String, Value))| {
+        let mut values: Vec<String> = texts.dictionary.iter().take(LISTED_VALUES).cloned().collect();
+        if texts.dictionary.len() > LISTED_VALUES {
+            values.push(format!("and {} more", texts.dictionary.len() - LISTED_VALUES));
         }
         format!("{name} is one of {}", values.join(", "))
     };

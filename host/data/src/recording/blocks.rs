@@ -175,7 +175,7 @@ pub(super) fn read_rows(
     dialect: Dialect,
     wanted: &[Wanted],
     width: usize,
-    head: &[Vec<u8>],
+    lines_above: &[Vec<u8>],
     size: Option<u64>,
     budget: Budget,
 ) -> Result<Rows, RowsError> {
@@ -192,7 +192,7 @@ pub(super) fn read_rows(
         failure: None,
     });
     let advanced = Condvar::new();
-    let work = || worker(&queue, &joined, &advanced, workers, dialect, wanted, width, head, size);
+    let work = || worker(&queue, &joined, &advanced, workers, dialect, wanted, width, lines_above, size);
     if workers == 1 {
         work();
     } else {
@@ -222,7 +222,7 @@ fn worker(
     dialect: Dialect,
     wanted: &[Wanted],
     width: usize,
-    head: &[Vec<u8>],
+    lines_above: &[Vec<u8>],
     size: Option<u64>,
 ) {
     let mut block = Vec::with_capacity(BLOCK + BLOCK / 2);
@@ -249,7 +249,7 @@ fn worker(
                 }
             }
         };
-        let parsed = parse(&block, dialect, wanted, width, head);
+        let parsed = parse(&block, dialect, wanted, width, lines_above);
         if parsed.is_err() {
             lock(queue).stopped = true;
         }

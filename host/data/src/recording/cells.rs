@@ -143,19 +143,19 @@ impl Parsed {
     pub(super) fn values(&self) -> usize {
         let numbers: usize = self.numbers.iter().map(Vec::len).sum();
         let texts = self.texts.iter().map(|t| {
-            t.codes.len().div_ceil(2) + t.words.iter().map(|w| 12 + w.len().div_ceil(4)).sum::<usize>()
+            t.codes.len().div_ceil(2) + t.dictionary.iter().map(|w| 12 + w.len().div_ceil(4)).sum::<usize>()
         });
         numbers + texts.sum::<usize>() + 2 * self.map.0.len() + self.skipped.len()
     }
 }
 
-/// Parses a block of whole lines; `width` cells are expected in each. Lines of `head`, which stood above the rows, may stand among them again.
+/// Parses a block of whole lines; `width` cells are expected in each. `lines_above` are lines above the rows, which may stand among them again.
 pub(super) fn parse(
     block: &[u8],
     dialect: Dialect,
     wanted: &[Wanted],
     width: usize,
-    head: &[Vec<u8>],
+    lines_above: &[Vec<u8>],
 ) -> Result<Parsed, Box<LineError>> {
     let mut out = Parsed {
         numbers: wanted.iter().map(|_| Vec::new()).collect(),
@@ -194,7 +194,7 @@ pub(super) fn parse(
                     out.map.note(out.rows, out.lines);
                     out.rows += 1;
                 }
-                Err(_) if head.iter().any(|above| above == line.trim_ascii_end()) => out.take_back(),
+                Err(_) if lines_above.iter().any(|above| above == line.trim_ascii_end()) => out.take_back(),
                 Err((_, value, fault)) if dialect.skip_missing && fault.is_missing(&value) => out.leave_out(),
                 Err((cell, value, fault)) => {
                     return Err(Box::new(LineError { line: out.lines, cell, value, fault }));

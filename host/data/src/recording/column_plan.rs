@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::cells::{Want, Wanted};
 use super::import::{Column, ColumnRef, Import, constant};
-use super::quantity::{Named, Quantity, Unit, named, usual_name};
+use super::quantity::{HeaderName, Quantity, Unit, parse_header, usual_name};
 use crate::error::{DataCode, Error, Result, nearest};
 
 /// What a column that is read is for.
@@ -243,15 +243,15 @@ fn usual(names: &[String], quantity: Quantity) -> Result<Usual<'_>> {
     let mut found: Option<(usize, Unit)> = None;
     let mut unknown = None;
     for (index, name) in names.iter().enumerate() {
-        match named(name) {
-            Named::Known(q, unit) if q == quantity => {
+        match parse_header(name) {
+            HeaderName::Known(q, unit) if q == quantity => {
                 if let Some((first, _)) = found {
                     return Err(duplicate(&names[first], name));
                 }
                 found = Some((index, unit));
             }
             // `cycle_count` and the like are other columns: these quantities have no unit to be unknown.
-            Named::UnknownUnit(q) if q == quantity && q.units().len() > 1 => {
+            HeaderName::UnknownUnit(q) if q == quantity && q.units().len() > 1 => {
                 unknown = unknown.or(Some(name.as_str()))
             }
             _ => {}

@@ -60,7 +60,7 @@ pub(super) fn without_common_prefix(mut table: ColumnTable) -> ColumnTable {
     }
 }
 
-/// Takes the requested columns, as numbers in SI or as words. Where text errors name a line, these name the row, counted from 1.
+/// Takes the requested columns, as numbers in SI or as texts. Where text errors name a line, these name the row, counted from 1.
 pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -> Result<Rows> {
     let mut rows = Rows::default();
     let keep = if missing == Missing::Skip { complete(table, wanted) } else { None };
@@ -78,7 +78,7 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
             }
             _ => length = Some((count, name)),
         }
-        let (mut numbers, mut words) = (Vec::new(), TextColumn::default());
+        let (mut numbers, mut texts) = (Vec::new(), TextColumn::default());
         match wanted.want {
             Want::Number { scale, offset } => {
                 numbers = in_si(column, scale, offset, keep.as_deref()).map_err(|e| e.column(name))?;
@@ -87,10 +87,10 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
                 let seconds = |text: &str| time_stamp_in(text, order).map(|v| v * scale + offset);
                 numbers = times(column, seconds, keep.as_deref()).map_err(|e| e.column(name))?;
             }
-            Want::Text => words = as_words(column, keep.as_deref()),
+            Want::Text => texts = as_texts(column, keep.as_deref()),
         }
         rows.numbers.push(numbers);
-        rows.texts.push(words);
+        rows.texts.push(texts);
     }
     rows.rows = length.map_or(0, |(n, _)| n);
     if let Some(keep) = &keep {
@@ -141,7 +141,7 @@ fn in_si(column: &Column, scale: f64, offset: f64, keep: Option<&[bool]>) -> Res
 /// Times of time stamps.
 fn times(column: &Column, seconds: impl Fn(&str) -> Option<f64>, keep: Option<&[bool]>) -> Result<Vec<f64>> {
     match column {
-        Column::Texts(texts) => kept(texts, keep)
+        Column::Texts(cells) => kept(cells, keep)
             .map(|(row, text)| {
                 seconds(text).ok_or_else(|| {
                     Error::new(DataCode::RecordingNotANumber, "not a time stamp")
@@ -160,15 +160,15 @@ fn times(column: &Column, seconds: impl Fn(&str) -> Option<f64>, keep: Option<&[
     }
 }
 
-/// The cells as words.
-fn as_words(column: &Column, keep: Option<&[bool]>) -> TextColumn {
-    let mut words = TextColumn::default();
+/// The cells as texts.
+fn as_texts(column: &Column, keep: Option<&[bool]>) -> TextColumn {
+    let mut texts = TextColumn::default();
     match column {
-        Column::Numbers(values) => kept(values, keep).for_each(|(_, v)| words.push(&v.to_string())),
-        Column::Texts(texts) => kept(texts, keep).for_each(|(_, t)| words.push(t)),
+        Column::Numbers(values) => kept(values, keep).for_each(|(_, v)| texts.push(&v.to_string())),
+        Column::Texts(cells) => kept(cells, keep).for_each(|(_, t)| texts.push(t)),
         Column::Other(_) => {}
     }
-    words
+    texts
 }
 
 /// Which rows have a finite number in every requested column of numbers; `None` where all have.

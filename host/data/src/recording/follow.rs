@@ -12,7 +12,7 @@ const UNKNOWN_PAUSE: f64 = 60.0;
 #[derive(Debug, Clone, Default)]
 pub struct Follower {
     clock: f64,
-    turns: usize,
+    reversals: usize,
     started: bool,
 }
 
@@ -37,8 +37,8 @@ impl Follower {
         self.started = true;
         self.clock += pause;
         let start = recording.time.first().copied().unwrap_or(0.0);
-        let mut turn = motion.turns.iter().map(|t| t.index).peekable();
-        let mut turns = self.turns;
+        let mut reversal = motion.reversals.iter().map(|t| t.index).peekable();
+        let mut reversals = self.reversals;
         let mut resting = vec![0.0; recording.len()];
         for hold in &motion.holds {
             if let Some(part) = resting.get_mut(hold.start..=hold.end) {
@@ -52,8 +52,8 @@ impl Follower {
         let first_motion = first_motion(motion);
         let out = (0..recording.len())
             .map(|i| {
-                while turn.next_if(|t| *t <= i).is_some() {
-                    turns += 1;
+                while reversal.next_if(|t| *t <= i).is_some() {
+                    reversals += 1;
                 }
                 Motion {
                     dt: if i == 0 { pause } else { recording.time[i] - recording.time[i - 1] },
@@ -67,22 +67,22 @@ impl Follower {
                     since_reversal: columns.since_reversal[i],
                     resting: resting[i],
                     hold_time: columns.hold_time[i] + if i < first_motion { stood } else { 0.0 },
-                    cycles: turns as f64 * 0.5,
+                    cycles: reversals as f64 * 0.5,
                     temperature: recording.temperature.as_ref().map_or(0.0, |t| t[i]),
                 }
             })
             .collect();
-        self.turns = turns + 1;
+        self.reversals = reversals + 1;
         self.clock += recording.duration();
         out
     }
 }
 
-/// Where the first motion of a recording ends: at its first turn or rest.
+/// Where the first motion of a recording ends: at its first reversal or rest.
 fn first_motion(motion: &motion::Motion) -> usize {
     let n = motion.direction.len();
     let begun = motion.direction.iter().position(|d| *d != 0).unwrap_or(n);
-    let turned = (begun..n).find(|i| motion.direction[*i] != motion.direction[begun]).unwrap_or(n);
+    let reversed = (begun..n).find(|i| motion.direction[*i] != motion.direction[begun]).unwrap_or(n);
     let rested = motion.holds.iter().map(|h| h.start).find(|s| *s > begun).unwrap_or(n);
-    turned.min(rested)
+    reversed.min(rested)
 }

@@ -3,7 +3,7 @@
 use super::cells::Dialect;
 use super::import::{Decimal, Import, Missing};
 use super::line::{Cells, is_remark};
-use super::quantity::{Named, named};
+use super::quantity::{HeaderName, parse_header};
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -12,7 +12,7 @@ pub(super) struct Header {
     pub dialect: Dialect,
     pub names: Vec<String>,
     /// The lines above the rows that are neither blank nor remarks: names, units, and what a program writes above them.
-    pub head: Vec<Vec<u8>>,
+    pub lines_above: Vec<Vec<u8>>,
     /// Bytes above the header or the first row.
     pub preamble: usize,
     /// Bytes and lines that the header takes.
@@ -25,7 +25,7 @@ impl Header {
         let mut header = Self::find(text, import)?;
         let above = text[..header.bytes].split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end);
         let has_content = |line: &&[u8]| !line.is_empty() && !is_remark(line, header.dialect.comment);
-        header.head = above.filter(has_content).map(<[u8]>::to_vec).collect();
+        header.lines_above = above.filter(has_content).map(<[u8]>::to_vec).collect();
         Ok(header)
     }
 
@@ -38,7 +38,7 @@ impl Header {
         let header = |dialect, names, (bytes, lines)| Self {
             dialect,
             names,
-            head: Vec::new(),
+            lines_above: Vec::new(),
             preamble: first.start,
             bytes,
             lines,
@@ -136,7 +136,7 @@ impl<'a> FirstLine<'a> {
     /// The names that some programs write as a remark above the numbers, where there is one for each column.
     fn names_in_remark(&self, columns: usize, dialect: Dialect) -> Result<Vec<String>> {
         let names = self.split(self.remark.trim_ascii(), dialect)?;
-        if names.len() == columns && names.iter().any(|n| named(n) != Named::Other) {
+        if names.len() == columns && names.iter().any(|n| parse_header(n) != HeaderName::Other) {
             return Ok(names);
         }
         Err(Error::new(DataCode::RecordingMissingColumn, "the file has no header line")
@@ -163,7 +163,8 @@ fn with_units(names: &[String], below: &[String]) -> Option<Vec<String>> {
         .zip(below)
         .map(|(name, unit)| {
             let with = format!("{name} [{}]", bare(unit));
-            let gained = !matches!(named(name), Named::Known(..)) && matches!(named(&with), Named::Known(..));
+            let gained = !matches!(parse_header(name), HeaderName::Known(..))
+                && matches!(parse_header(&with), HeaderName::Known(..));
             if gained { with } else { name.clone() }
         })
         .collect();

@@ -18,11 +18,11 @@
 //! ```
 
 mod absolute;
+mod constant_pressure;
+mod file_name_length;
 mod forms;
 mod layout;
 mod lookup;
-mod named_length;
-mod named_pressure;
 mod names;
 mod notes;
 mod others;

@@ -92,7 +92,8 @@ impl File<'_> {
             }
             kind::MESSAGE => {
                 let parts = message(body).zip(log_time(body));
-                let ((number, _, data), logged) = parts.ok_or_else(|| damaged("a message without a head"))?;
+                let ((number, _, data), logged) =
+                    parts.ok_or_else(|| damaged("a message without a header"))?;
                 let known = match &mut self.others {
                     Some(others) => others.message(number, logged, data)?,
                     None => self.samples.message(number, data)?,

@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | `criteria` | every threshold with symbol, unit, meaning and source |
 //! | `scale` | noise, smoothing, what counts as a motion |
-//! | `turning` | reversals, and the sample at which each begins |
+//! | `legs` | reversals, and the sample at which each begins |
 //! | `holding` | where the length is held |
 //! | `columns` | travel and time since a reversal, time at rest, cycles |
 //! | `state` | what each sample shows: held, in doubt, on a ramp |
@@ -16,23 +16,23 @@
 //! | `rates` | speed, acceleration, pressure rate |
 //!
 //! The direction of friction is the sign of the speed while the muscle moves. While its length is held, it is the way the pressure
-//! drives it: filling counts as shortening. While neither changes, the last direction stays; before the first change it is unknown. Noise and ripple flip nothing: a turn counts only when the column goes back by more than noise can. But it
+//! drives it: filling counts as shortening. While neither changes, the last direction stays; before the first change it is unknown. Noise and ripple flip nothing: a reversal counts only when the column goes back by more than noise can. But it
 //! counts from where it began, not from where it was noticed, for a sample on the wrong side costs 2 k_F F.
 
 mod columns;
 pub(crate) mod criteria;
 mod holding;
+mod legs;
 mod rates;
 mod reversals;
 mod scale;
 mod settled;
 mod state;
-mod turning;
 
 pub use columns::MotionColumns;
 pub use holding::Hold;
 pub use rates::Rates;
-pub use settled::{at_rest, fast_step, settled, settled_way, turn, way};
+pub use settled::{at_rest, fast_step, reversal_threshold, settled, settled_way, way};
 pub use state::MotionState;
 
 use super::campaign::{Campaign, Clock};
@@ -40,8 +40,8 @@ use super::columns::Recording;
 use crate::criteria::Stage;
 use crate::statistics::quantile;
 use criteria::{LEVEL_SAMPLES, MOTION_STROKE_FLOOR, MOTION_STROKE_SHARE, RANGE_TRIM};
-use reversals::{stated_turns, stroke_turns, with_pressure};
-use turning::{Track, legs};
+use legs::{Track, legs};
+use reversals::{stated_reversals, stroke_reversals, with_pressure};
 
 #[cfg(test)]
 mod tests;
@@ -62,7 +62,7 @@ pub enum Cause {
 
 /// A change of direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turn {
+pub struct Reversal {
     /// First sample of the new direction.
     pub index: usize,
     /// 1 shortening or filling, −1 lengthening or emptying.
@@ -77,18 +77,18 @@ pub struct Motion {
     /// Per sample: 1 shortening, −1 lengthening, 0 not known yet.
     pub direction: Vec<i8>,
     /// Changes of direction in order, the first known direction included.
-    pub turns: Vec<Turn>,
+    pub reversals: Vec<Reversal>,
     /// Where the length was held, in order.
     pub holds: Vec<Hold>,
     /// Whether the length was never moved.
     pub is_isometric: bool,
     /// Standard deviation of the stroke's noise, m.
     pub stroke_noise: f64,
-    /// A stroke back by more than this is a turn, m.
+    /// A stroke back by more than this is a reversal, m.
     pub stroke_threshold: f64,
     /// Standard deviation of the pressure's noise, Pa.
     pub pressure_noise: f64,
-    /// A pressure back by more than this, at held length, is a turn, Pa.
+    /// A pressure back by more than this, at held length, is a reversal, Pa.
     pub pressure_threshold: f64,
 }
 
@@ -122,10 +122,10 @@ impl Motion {
         let holds = holding::holds(time, &smooth, &scale, &legs);
         let track =
             Track { time, raw: stroke, smooth: &smooth, noise: scale.noise, threshold: scale.threshold };
-        let mut turns = stroke_turns(&track, &legs, &holds);
+        let mut reversals = stroke_reversals(&track, &legs, &holds);
         drop(smooth);
         match &recording.direction {
-            Some(directions) => turns = stated_turns(directions),
+            Some(directions) => reversals = stated_reversals(directions),
             None => {
                 let track = Track {
                     time,
@@ -134,23 +134,23 @@ impl Motion {
                     noise: air.noise,
                     threshold: air.threshold,
                 };
-                turns = with_pressure(turns, &holds, &track);
+                reversals = with_pressure(reversals, &holds, &track);
             }
         }
-        turns.dedup_by(|later, earlier| later.direction == earlier.direction);
+        reversals.dedup_by(|later, earlier| later.direction == earlier.direction);
         let mut direction = vec![before; time.len()];
-        for (n, turn) in turns.iter().enumerate() {
-            let end = turns.get(n + 1).map_or(time.len(), |t| t.index);
-            if let Some(part) = direction.get_mut(turn.index..end) {
-                part.fill(turn.direction);
+        for (n, reversal) in reversals.iter().enumerate() {
+            let end = reversals.get(n + 1).map_or(time.len(), |t| t.index);
+            if let Some(part) = direction.get_mut(reversal.index..end) {
+                part.fill(reversal.direction);
             }
         }
-        if turns.first().is_some_and(|t| t.direction == before) {
-            turns.remove(0);
+        if reversals.first().is_some_and(|t| t.direction == before) {
+            reversals.remove(0);
         }
         Self {
             direction,
-            turns,
+            reversals,
             holds,
             is_isometric,
             stroke_noise: scale.noise,

@@ -49,7 +49,7 @@ const SEPARATORS: &[char] = &['_', '-', ' '];
 
 /// A file's name that says its mounting: what it calls the mounting, and the number of the run. `None` where it does not end in the number
 /// of a run, as `short7_run2.csv` does.
-fn named(name: &str) -> Option<(String, u64)> {
+fn mounting_and_run(name: &str) -> Option<(String, u64)> {
     let stem = name.split('.').next().unwrap_or("").to_ascii_lowercase();
     let bare = stem.trim_end_matches(|c: char| c.is_ascii_digit());
     let run = stem[bare.len()..].parse().ok()?;
@@ -72,7 +72,7 @@ fn are_numbered(recordings: &[Recording]) -> bool {
     let names: Option<Vec<(u64, &str)>> = recordings.iter().map(|r| leading_number(&r.name)).collect();
     let names = names.unwrap_or_default();
     let next_run = |before: &str, after: &str| {
-        named(before).zip(named(after)).is_some_and(|(b, a)| b.0 == a.0 && b.1 < a.1)
+        mounting_and_run(before).zip(mounting_and_run(after)).is_some_and(|(b, a)| b.0 == a.0 && b.1 < a.1)
     };
     names.windows(2).all(|pair| pair[0].0 < pair[1].0)
         && names.windows(2).any(|pair| next_run(pair[0].1, pair[1].1))
@@ -84,7 +84,7 @@ fn called(recording: &Recording, numbered: bool) -> Option<String> {
         return Some(recording.mounting());
     }
     let name = leading_number(&recording.name).filter(|_| numbered).map_or(recording.name.as_str(), |n| n.1);
-    named(name).map(|(mounting, _)| mounting)
+    mounting_and_run(name).map(|(mounting, _)| mounting)
 }
 
 impl Campaign {

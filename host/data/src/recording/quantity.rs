@@ -131,7 +131,7 @@ impl Quantity {
 
 /// What a header's name means.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Named {
+pub enum HeaderName {
     /// A quantity in a unit.
     Known(Quantity, Unit),
     /// A quantity whose unit is not one of its own, or missing.
@@ -166,18 +166,18 @@ pub(super) fn usual_name(header: &str) -> String {
 /// Reads a header's name.
 ///
 /// ```
-/// use pam_data::recording::{Named, Quantity, named};
-/// assert!(matches!(named("pressure_command_kPa"), Named::Known(Quantity::PressureCommand, u) if u.scale == 1e3));
-/// assert_eq!(named("Force [lbf]"), named("force_lbf"));
-/// assert_eq!(named("Temperature [°C]"), named("temperature_C"));
-/// assert_eq!(named("Time [\u{fffd}s]"), Named::UnknownUnit(Quantity::Time));
-/// assert_eq!(named("pressure_mmHg"), Named::UnknownUnit(Quantity::Pressure));
-/// assert_eq!(named("pressure_sd_kPa"), Named::Other);
-/// assert_eq!(named("t_s"), named("time_s"));
-/// assert_eq!(named("stroke_mm"), named("displacement_mm"));
+/// use pam_data::recording::{HeaderName, Quantity, parse_header};
+/// assert!(matches!(parse_header("pressure_command_kPa"), HeaderName::Known(Quantity::PressureCommand, u) if u.scale == 1e3));
+/// assert_eq!(parse_header("Force [lbf]"), parse_header("force_lbf"));
+/// assert_eq!(parse_header("Temperature [°C]"), parse_header("temperature_C"));
+/// assert_eq!(parse_header("Time [\u{fffd}s]"), HeaderName::UnknownUnit(Quantity::Time));
+/// assert_eq!(parse_header("pressure_mmHg"), HeaderName::UnknownUnit(Quantity::Pressure));
+/// assert_eq!(parse_header("pressure_sd_kPa"), HeaderName::Other);
+/// assert_eq!(parse_header("t_s"), parse_header("time_s"));
+/// assert_eq!(parse_header("stroke_mm"), parse_header("displacement_mm"));
 /// ```
 #[must_use]
-pub fn named(header: &str) -> Named {
+pub fn parse_header(header: &str) -> HeaderName {
     let usual = usual_name(header);
     let known = Quantity::IN_HEADERS.into_iter().filter_map(|q| {
         // `pressure_command_kPa` is not a pressure in `command_kPa`: a unit has no underscore.
@@ -199,13 +199,13 @@ pub fn named(header: &str) -> Named {
         && let Some((_, quantity)) = symbols.iter().find(|(s, _)| *s == symbol)
         && let Some(unit) = quantity.unit(unit)
     {
-        return Named::Known(*quantity, unit);
+        return HeaderName::Known(*quantity, unit);
     }
     // The longest name: a bare `pressure_command` is not a pressure in `command`.
     match known.max_by_key(|(q, _)| q.name().len()) {
         Some((quantity, unit)) => {
-            quantity.unit(unit).map_or(Named::UnknownUnit(quantity), |u| Named::Known(quantity, u))
+            quantity.unit(unit).map_or(HeaderName::UnknownUnit(quantity), |u| HeaderName::Known(quantity, u))
         }
-        None => Named::Other,
+        None => HeaderName::Other,
     }
 }

@@ -17,7 +17,7 @@ use super::import::{Decimal, Import, Missing, Value};
 use super::line::decode;
 use super::lookup::read_lookup;
 use super::mcap::Needed;
-use super::quantity::{Named, Quantity, named};
+use super::quantity::{HeaderName, Quantity, parse_header};
 use super::source;
 use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
@@ -247,7 +247,7 @@ impl<'a> Reader<'a> {
             header.dialect,
             &layout.plan.wanted,
             header.names.len(),
-            &header.head,
+            &header.lines_above,
             source.size.or(average),
             Budget::default(),
         )
@@ -375,7 +375,7 @@ impl<'a> Reader<'a> {
 fn header_below(text: &[u8], header: &Header) -> Option<u64> {
     let names = |line: &[u8]| {
         let line = String::from_utf8_lossy(line);
-        let known = |n: &str| matches!(named(n.trim().trim_matches('"')), Named::Known(..));
+        let known = |n: &str| matches!(parse_header(n.trim().trim_matches('"')), HeaderName::Known(..));
         line.split([',', ';', '\t']).filter(|n| known(n)).count()
     };
     let below = text[header.bytes..].split(|b| *b == b'\n').take(LOOKED_BELOW);

@@ -127,10 +127,10 @@ impl Usual {
         let expected = ExpectedForce::of(campaign, &masks)?;
         let taken = || campaign.recordings.iter().zip(skipped).filter(|(_, skip)| !**skip).map(|(r, _)| r);
         let spans = Channel::ALL.map(|c| {
-            let mut some: Vec<f64> = taken().flat_map(|r| thinned(c.of(r))).collect();
+            let mut some: Vec<f64> = taken().flat_map(|r| downsampled(c.of(r))).collect();
             quantile(&mut some, 0.998) - quantile(&mut some, 0.002)
         });
-        let mut tops: Vec<f64> = taken().flat_map(|r| thinned(&r.pressure)).collect();
+        let mut tops: Vec<f64> = taken().flat_map(|r| downsampled(&r.pressure)).collect();
         let top_pressure = quantile(&mut tops, 0.99);
         let mut residuals: Vec<f64> = taken()
             .filter(|r| r.force.is_some() && !r.is_empty())
@@ -168,7 +168,7 @@ fn stride(rows: usize) -> usize {
     (rows / EXAMINED).max(1)
 }
 
-fn thinned(column: &[f64]) -> impl Iterator<Item = f64> + '_ {
+fn downsampled(column: &[f64]) -> impl Iterator<Item = f64> + '_ {
     column.iter().step_by(stride(column.len())).copied()
 }
 

@@ -41,12 +41,12 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bo
     let mut magic = Vec::new();
     (&mut file).take(512).read_to_end(&mut magic).map_err(unreadable)?;
     // A pipe cannot be rewound, so the bytes already read go in front again.
-    let counted = Counted {
+    let counting = CountingReader {
         bytes: io::Cursor::new(magic.clone()).chain(file),
         hash: hashed.then(Sha256::new),
         progress: progress.cloned(),
     };
-    let bytes = Bytes(Arc::new(Mutex::new(counted)));
+    let bytes = Bytes(Arc::new(Mutex::new(counting)));
     let (whole, rereadable) = (bytes.clone(), meta.is_file());
     let mut size = None;
     let reader: Box<dyn Read + Send> = if magic.starts_with(&GZIP) {
@@ -66,13 +66,13 @@ pub(super) fn open(path: &Path, progress: Option<&Arc<dyn Progress>>, hashed: bo
 }
 
 /// A file that counts and hashes the bytes that are read.
-struct Counted {
+struct CountingReader {
     bytes: io::Chain<io::Cursor<Vec<u8>>, File>,
     hash: Option<Sha256>,
     progress: Option<Arc<dyn Progress>>,
 }
 
-impl Read for Counted {
+impl Read for CountingReader {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.bytes.read(buffer)?;
         if let Some(hash) = &mut self.hash {
@@ -87,17 +87,17 @@ impl Read for Counted {
 
 /// The file itself, which a decompressor reads and whose hash is requested in the end.
 #[derive(Clone)]
-pub(super) struct Bytes(Arc<Mutex<Counted>>);
+pub(super) struct Bytes(Arc<Mutex<CountingReader>>);
 
 impl Bytes {
     /// SHA-256 of all bytes, including those that were not needed, in hexadecimal; `None` where it was not requested.
     pub(super) fn sha256(&self) -> io::Result<Option<String>> {
-        let mut counted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if counted.hash.is_none() {
+        let mut counting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if counting.hash.is_none() {
             return Ok(None);
         }
-        io::copy(&mut *counted, &mut io::sink())?;
-        let hash = counted.hash.take();
+        io::copy(&mut *counting, &mut io::sink())?;
+        let hash = counting.hash.take();
         Ok(hash.map(|hash| hash.finalize().iter().map(|b| format!("{b:02x}")).collect()))
     }
 }
@@ -178,9 +178,9 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
             "copy the file again, or export its columns as CSV",
         );
     }
-    let head = &first[..first.len().min(1 << 16)];
-    let zeros = memchr::memchr_iter(0, head).count();
-    if zeros > 0 && zeros * 3 > head.len() && zeros * 3 < head.len() * 2 {
+    let start = &first[..first.len().min(1 << 16)];
+    let zeros = memchr::memchr_iter(0, start).count();
+    if zeros > 0 && zeros * 3 > start.len() && zeros * 3 < start.len() * 2 {
         return not_text(
             "the file looks like UTF-16 text without a mark",
             "save it as UTF-8, or as plain text",

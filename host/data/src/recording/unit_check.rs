@@ -140,8 +140,8 @@ impl Exclusion {
     fn best(mut all: Vec<Self>, count: usize, with_all: f64) -> Option<Self> {
         all.sort_by(|a, b| a.disagreement.total_cmp(&b.disagreement));
         // A mistake that leaves the others in disagreement explains nothing: another recording is wrong.
-        let agreed = all.first()?.disagreement / (count - 1) as f64;
-        let allowed = with_all.min(count as f64 * agreed);
+        let mean_disagreement = all.first()?.disagreement / (count - 1) as f64;
+        let allowed = with_all.min(count as f64 * mean_disagreement);
         let explained = |e: &Self| e.corrected.filter(|sum| *sum < allowed);
         let best =
             (0..all.len()).filter_map(|i| Some((explained(&all[i])?, i))).min_by(|a, b| a.0.total_cmp(&b.0));

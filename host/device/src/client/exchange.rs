@@ -83,7 +83,7 @@ impl Client {
     }
 
     pub(super) fn send(&mut self, bytes: &[u8]) -> Result<()> {
-        let _turn = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        let _guard = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         self.port.write_all(bytes).map_err(|e| lost(&self.port, &e))
     }
 
@@ -93,7 +93,7 @@ impl Client {
         id: u8,
         sequence: u16,
         patience: Duration,
-        heard: &mut LineActivity,
+        activity: &mut LineActivity,
     ) -> Result<Option<Answer>> {
         let deadline = Instant::now() + patience;
         loop {
@@ -101,7 +101,7 @@ impl Client {
             if left.is_zero() {
                 return Ok(None);
             }
-            let answers = self.pump(left, heard)?;
+            let answers = self.pump(left, activity)?;
             let ours = |a: &Answer| a.header.id == id && a.header.sequence == sequence;
             if let Some(answer) = answers.into_iter().find(ours) {
                 return Ok(Some(answer));
@@ -110,20 +110,24 @@ impl Client {
     }
 
     /// Reads once, sorts what came: topics into their queue, answers to the caller.
-    pub(super) fn pump(&mut self, patience: Duration, heard: &mut LineActivity) -> Result<Vec<Answer>> {
+    pub(super) fn pump(&mut self, patience: Duration, activity: &mut LineActivity) -> Result<Vec<Answer>> {
         let mut buffer = [0; 2048];
         let count = match self.port.read(&mut buffer, patience) {
             Ok(count) => count,
             Err(e) => {
                 // Another program often hangs up on bytes that it does not understand: what it sent before shows more.
-                return Err(if heard.bytes > 0 { heard.error(&self.port) } else { lost(&self.port, &e) });
+                return Err(if activity.bytes > 0 {
+                    activity.error(&self.port)
+                } else {
+                    lost(&self.port, &e)
+                });
             }
         };
-        heard.take(&buffer[..count]);
+        activity.take(&buffer[..count]);
         let mut answers = Vec::new();
         for &byte in &buffer[..count] {
             let Some(Ok(frame)) = self.accumulator.push(byte) else { continue };
-            heard.frames += 1;
+            activity.frames += 1;
             match frame.header.kind {
                 Kind::Refusal
                     if frame.header.id == KeepAlive::ID
@@ -136,7 +140,7 @@ impl Client {
                 }
                 Kind::Topic => self.topics.take(frame.header, frame.body),
                 // A controller never asks: what arrives as a request is our own, sent back.
-                Kind::Request => heard.echoes += 1,
+                Kind::Request => activity.echoes += 1,
             }
         }
         Ok(answers)

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Where the axis is and goes.
 #[derive(Debug, Clone, Copy, Default)]
-struct Course {
+struct AxisState {
     now_m: f64,
     to_m: f64,
     speed_m_per_s: f64,
@@ -24,7 +24,7 @@ struct Course {
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Axis {
-    course: Arc<Mutex<Course>>,
+    state: Arc<Mutex<AxisState>>,
     waits: Arc<AtomicBool>,
 }
 
@@ -32,42 +32,42 @@ impl Axis {
     /// Moves to a stroke, m, at a speed, m/s, from now on. A number that is none changes nothing.
     pub fn go(&self, to_m: f64, speed_m_per_s: f64) {
         if to_m.is_finite() && speed_m_per_s > 0.0 {
-            let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
-            (course.to_m, course.speed_m_per_s) = (to_m, speed_m_per_s);
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            (state.to_m, state.speed_m_per_s) = (to_m, speed_m_per_s);
         }
     }
 
     /// Stops where it is.
     pub fn stop(&self) {
-        let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
-        course.to_m = course.now_m;
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.to_m = state.now_m;
     }
 
     /// Where it is, m.
     #[must_use]
     pub fn now(&self) -> f64 {
-        self.course.lock().unwrap_or_else(PoisonError::into_inner).now_m
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).now_m
     }
 
     /// True pressure of the muscle, Pa, and the time of the bench, s, for who watches from outside.
     #[must_use]
     pub fn seen(&self) -> (f64, f64) {
-        let course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
-        (course.pressure_pa, course.time_s)
+        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        (state.pressure_pa, state.time_s)
     }
 
     /// Notes the true pressure of the muscle.
     pub(super) fn notes(&self, pressure_pa: f64) {
-        self.course.lock().unwrap_or_else(PoisonError::into_inner).pressure_pa = pressure_pa;
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).pressure_pa = pressure_pa;
     }
 
     /// Where it is after another `dt` seconds, m.
     pub fn advance(&self, dt: f64) -> f64 {
-        let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
-        course.time_s += dt;
-        let way = course.speed_m_per_s * dt;
-        course.now_m += (course.to_m - course.now_m).clamp(-way, way);
-        course.now_m
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.time_s += dt;
+        let way = state.speed_m_per_s * dt;
+        state.now_m += (state.to_m - state.now_m).clamp(-way, way);
+        state.now_m
     }
 
     /// Pauses the bench, or lets it continue: an emulated muscle need not change while a program computes.

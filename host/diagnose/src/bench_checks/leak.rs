@@ -37,7 +37,7 @@ impl Leak {
     /// determine its size: then it has no parameters, and stays out of the table.
     pub(super) fn enter(&self, diagnosis: &mut Diagnosis, given: &[Law]) {
         let Some(leak) = Law::all().find(|c| c.traits().loses_air) else { return };
-        let (check, value) = (Loss::CHECK.to_string(), self.loss.words());
+        let (check, value) = (Loss::CHECK.to_string(), self.loss.description());
         let info = leak.info();
         let named = diagnosis.missing.iter().any(|m| m.effect == info.name);
         match self.finding {

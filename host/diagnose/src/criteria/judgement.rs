@@ -65,7 +65,7 @@ pam_data::criteria! {
     /// ... and changes by more than this share of itself.
     STRAIGHT_CHANGE: f64 = 0.3, "dE/E", "1", Judgement;
     /// Other dimensions of the muscle are tried where a fit of them leaves less than this share of the excess error of the described ones.
-    DIMENSIONS_LEAVE: f64 = 0.5, "e_dim/e", "1", Judgement;
+    DIMENSIONS_LEAVE: f64 = 0.1, "e_dim/e", "1", Judgement;
     /// Effects listed that would make the tables' surface, at most.
     MOST_LISTED: usize = 6, "n_list", "1", Cost;
     /// Rounds of fitting the table to the force without the effects.

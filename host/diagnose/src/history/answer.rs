@@ -317,7 +317,7 @@ pub struct LayerShare {
 
 /// Force over time since the mounting at one pressure, for a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course {
+pub struct ForceOverTime {
     /// Number of the mounting, from 1.
     pub mounting: usize,
     /// Its length, mm.
@@ -358,7 +358,7 @@ pub struct History {
     /// What each layer takes of the squared error of unseen runs.
     pub layers: Vec<LayerShare>,
     /// For a picture.
-    pub courses: Vec<Course>,
+    pub force_over_time: Vec<ForceOverTime>,
     /// Slope of the force over pressure at full length near the highest pressure, N/kPa: comes with the length to an end effect over a stock.
     pub full_length_slope_N_per_kPa: Option<f64>,
 }

@@ -5,8 +5,8 @@ use pam_data::statistics::NORMAL_95;
 use pam_fit::bench::{BenchName, Candidate};
 
 use super::History;
+use super::additional_effect::AdditionalEffect;
 use super::answer::Estimate;
-use super::beside::Needed;
 use super::criteria::{ENTER_REFUTES, ENTER_SURE, ENTER_UNSURE, LEAST_GAIN};
 use super::findings::{Contrast, chance};
 use super::slack_reading::SlackReading;
@@ -81,7 +81,7 @@ pub(super) fn memory(history: &History, peak: f64) -> Missing {
 }
 
 /// An effect beside the memory as an entry of what is missing. `left` is the share of the squared error that the memory leaves.
-pub(super) fn beside_memory(needed: &Needed, left: f64) -> Missing {
+pub(super) fn beside_memory(needed: &AdditionalEffect, left: f64) -> Missing {
     let info = needed.effect.info();
     let probability = if needed.confusable.is_empty() { ENTER_SURE } else { ENTER_UNSURE };
     let share = (left * needed.gain).clamp(0.0, 1.0);

@@ -19,7 +19,7 @@ use model_core::effects::EffectName;
 use model_core::units::Length;
 use pam_fit::bench::Candidate;
 
-use super::beside::{Column, Tried, measured, no_worse, tried};
+use super::additional_effect::{Column, Tried, measured, no_worse, tried};
 use super::campaign::Run;
 use super::criteria::{FOLLOWED_OVER, LEAST_AREA, THRESHOLD_FROM, THRESHOLD_TO, TIMES};
 use super::law::{Law, Layer};

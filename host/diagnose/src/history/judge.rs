@@ -2,7 +2,7 @@
 
 use super::Fits;
 use super::answer::{
-    Course, ErrorSize, Estimate, Finding, FindingDetail, History, LayerName, LayerShare, MemoryLaw,
+    ErrorSize, Estimate, Finding, FindingDetail, ForceOverTime, History, LayerName, LayerShare, MemoryLaw,
     MemoryRefusal, Mounting, RunError, StaticCurve, UnseenRuns,
 };
 use super::campaign::Points;
@@ -10,7 +10,7 @@ use super::criteria::{
     FIRST_RUN_WAYS, JUDGE_LOADED_LONG, JUDGE_PICTURED, LEAST_GAIN, MEMORY_LEAST_SHARE, TIMES,
 };
 use super::findings::{self, Contrast, Visits};
-use super::gap;
+use super::hysteresis;
 use super::law::Law;
 use super::shift_fit::knot_step;
 use super::slack_reading::SlackReading;
@@ -46,7 +46,7 @@ pub(super) fn answer(points: &Points, fits: &Fits<'_>, campaign: &Campaign, rest
         runs: runs(points, fits, law, unseen, campaign),
         findings: all_findings(points, fits, &visits, named, quantile * share),
         layers: layers(points, fits),
-        courses: courses(points, fits, law, rest_length),
+        force_over_time: force_over_time(points, fits, law, rest_length),
         full_length_slope_N_per_kPa: findings::full_length_slope(points),
     }
 }
@@ -166,7 +166,7 @@ fn all_findings(points: &Points, fits: &Fits<'_>, visits: &Visits, named: bool, 
     let mut found = Vec::new();
     found.extend(first_run(points, fits, visits, named));
     found.push(creep(points, fits, named, half));
-    found.extend(gap::finding(points, fits, visits, named));
+    found.extend(hysteresis::finding(points, fits, visits, named));
     found.extend(fits.events.iter().map(|e| {
         let half = if e.lasts {
             half_width_95(fits.memory.folds.len().saturating_sub(1)) * e.error
@@ -281,7 +281,7 @@ fn layers(points: &Points, fits: &Fits<'_>) -> Vec<LayerShare> {
 }
 
 /// Force over time at one pressure, of each mounting that pulls there.
-fn courses(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec<Course> {
+fn force_over_time(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec<ForceOverTime> {
     let step = knot_step(points.highest());
     let pressure = (JUDGE_PICTURED * points.highest() / step).round() * step;
     let since = &fits.layer.clocks[law.choice.pause].1.since;
@@ -290,7 +290,7 @@ fn courses(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec
         .map(|m| {
             let near = (0..points.len())
                 .filter(|i| points.mounting[*i] == m && (points.pressure[*i] - pressure).abs() <= 0.5 * step);
-            let mut course = Course {
+            let mut curve = ForceOverTime {
                 mounting: m + 1,
                 length_mm: 1e3 * (rest_length - points.mountings[m].stroke),
                 pressure_kPa: pressure,
@@ -301,11 +301,11 @@ fn courses(points: &Points, fits: &Fits<'_>, law: &Law, rest_length: f64) -> Vec
             for i in near {
                 let at_pressure = fits.layer.spline.at(pressure + shift(i)).value(&law.fit.curves[m]);
                 let moved = at_pressure - fits.layer.predict(law, i);
-                course.time_s.push(since[i]);
-                course.force_N.push(points.force[i] + moved);
-                course.law_N.push(at_pressure);
+                curve.time_s.push(since[i]);
+                curve.force_N.push(points.force[i] + moved);
+                curve.law_N.push(at_pressure);
             }
-            course
+            curve
         })
         .filter(|c| c.time_s.len() > 3)
         .collect()

@@ -23,7 +23,7 @@ use super::criteria::{
     LAW_MOST_STEPS, LAW_NO_SIGN, LAW_NUDGE, LAW_SETTLED_SHARE, LAW_TELLS_BALANCE, LOADED, NEAR_BALANCE,
     PAUSES, RAMP, THRESHOLD_BEYOND, THRESHOLD_FROM, THRESHOLD_TO,
 };
-use super::memory::Clockwork;
+use super::memory::StateSteps;
 use super::shift_fit::{self, ShiftFit};
 
 /// Assumptions about times that are not recorded.
@@ -43,7 +43,7 @@ pub(super) struct Layer<'a> {
     /// `P_th,m`, kPa.
     pub thresholds: Vec<f64>,
     /// Pauses between runs, s, with the steps of the states over each.
-    pub clocks: Vec<(f64, Clockwork)>,
+    pub clocks: Vec<(f64, StateSteps)>,
     /// Whether the recordings determine `P_b`.
     pub balance_is_free: bool,
 }
@@ -92,7 +92,7 @@ impl<'a> Layer<'a> {
     pub(super) fn new(points: &'a Points, times: &[f64]) -> Self {
         let thresholds = thresholds(points);
         let pauses = if points.pauses_known() { &PAUSES[..1] } else { &PAUSES[..] };
-        let clocks = pauses.iter().map(|p| (*p, Clockwork::new(points, *p, times))).collect();
+        let clocks = pauses.iter().map(|p| (*p, StateSteps::new(points, *p, times))).collect();
         let (low, high) = extremes(&thresholds);
         // One mounting determines c (P_th − P_b) only; two determine P_b where their carried parts differ.
         let balance_is_free = low < NEAR_BALANCE * BALANCE_START && high - low > RAMP;

@@ -19,7 +19,7 @@ struct Node {
 
 /// The steps of the states over a campaign, for one assumption on the pauses between runs.
 #[derive(Clone, Debug)]
-pub(super) struct Clockwork {
+pub(super) struct StateSteps {
     nodes: Vec<Node>,
     /// `a, α, β` for each node and time constant.
     steps: Vec<[f64; 3]>,
@@ -40,10 +40,10 @@ fn step(dt: f64, time: f64) -> [f64; 3] {
     [1.0 - faded, faded - late, late]
 }
 
-impl Clockwork {
+impl StateSteps {
     /// The steps over a campaign. `pause` is what is assumed between runs, s; the bench's clock is used instead where it is known.
     pub(super) fn new(points: &Points, pause: f64, times: &[f64]) -> Self {
-        let mut clockwork = Self {
+        let mut steps = Self {
             nodes: Vec::new(),
             steps: Vec::new(),
             times: times.to_vec(),
@@ -58,12 +58,12 @@ impl Clockwork {
                 if let (Some(zero), Some(own)) = (zero, run.start) {
                     start = own - zero;
                 }
-                clockwork.push(Node { point: None, begins: order == 0 }, start - last);
+                steps.push(Node { point: None, begins: order == 0 }, start - last);
                 last = start;
                 for i in run.points.0..run.points.1 {
                     let now = start + points.time[i];
-                    clockwork.since[i] = now;
-                    clockwork.push(Node { point: Some(i), begins: false }, now - last);
+                    steps.since[i] = now;
+                    steps.push(Node { point: Some(i), begins: false }, now - last);
                     last = now;
                 }
                 let following = mounting.runs.get(order + 1).and_then(|n| points.runs[*n].start);
@@ -72,12 +72,12 @@ impl Clockwork {
                     _ => pause,
                 };
                 let vented = VENT_TIME.min(0.5 * pause);
-                clockwork.push(Node { point: None, begins: false }, vented);
+                steps.push(Node { point: None, begins: false }, vented);
                 start = last + pause;
                 last += vented;
             }
         }
-        clockwork
+        steps
     }
 
     fn push(&mut self, node: Node, dt: f64) {
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn a_ramp_then_a_hold_is_answered_as_in_closed_form() {
         let points = held(1, 1);
-        let z = Clockwork::new(&points, 5.0, &[10.0]).mean_state(&vec![1.0; 100], 0.0);
+        let z = StateSteps::new(&points, 5.0, &[10.0]).mean_state(&vec![1.0; 100], 0.0);
         // dz/dt = (t/0.5 − z)/10 to 0.5 s, then (1 − z)/10.
         let ramped = (0.5 - 10.0 * (1.0 - (-0.05_f64).exp())) / 0.5;
         for (i, time) in [(0, 0.0_f64), (50, 25.0), (99, 49.5)] {
@@ -155,7 +155,8 @@ mod tests {
     #[test]
     fn the_states_outlive_a_pause_and_restart_with_a_mounting() {
         let points = held(2, 2);
-        let z = Clockwork::new(&points, 5.0, &super::super::criteria::TIMES).mean_state(&vec![1.0; 400], 0.0);
+        let z =
+            StateSteps::new(&points, 5.0, &super::super::criteria::TIMES).mean_state(&vec![1.0; 400], 0.0);
         assert!(z[100] > z[0] + 0.2, "the second run starts from the first: {} {}", z[0], z[100]);
         assert_eq!(z[..200], z[200..]);
     }

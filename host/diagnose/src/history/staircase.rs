@@ -35,7 +35,7 @@ pub(super) fn settled(recording: &Recording, force: &[f64]) -> (Vec<Point>, bool
     let directions = stated.map_or_else(|| vec![0; recording.len()], held_directions);
     let (mut points, averaged) = averages(recording, force, &directions);
     if stated.is_none() {
-        turns(&mut points);
+        set_directions(&mut points);
     }
     (points, averaged)
 }
@@ -66,11 +66,11 @@ fn averages(recording: &Recording, force: &[f64], directions: &[i8]) -> (Vec<Poi
     let mut open: Option<i64> = None;
     let mut own: Vec<usize> = Vec::new();
     for i in 0..recording.len() {
-        let turns = (recording.time[i] - first - phase) / period;
-        if !(window.0..window.1).contains(&(turns - turns.floor())) {
+        let periods = (recording.time[i] - first - phase) / period;
+        if !(window.0..window.1).contains(&(periods - periods.floor())) {
             continue;
         }
-        let pulse = turns.floor() as i64;
+        let pulse = periods.floor() as i64;
         if open.is_some_and(|p| p != pulse) {
             points.extend(mean(recording, force, directions, &history, &own));
             own.clear();
@@ -92,7 +92,8 @@ fn mean(
 ) -> Option<Point> {
     let first = *rows.first()?;
     let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|i| of(*i)).sum::<f64>() / rows.len() as f64;
-    let course: Vec<(f64, f64)> = rows.iter().map(|i| (recording.time[*i], recording.pressure[*i])).collect();
+    let readings: Vec<(f64, f64)> =
+        rows.iter().map(|i| (recording.time[*i], recording.pressure[*i])).collect();
     Some(Point {
         time: mean(&|i| recording.time[i]),
         pressure: mean(&|i| recording.pressure[i]),
@@ -100,7 +101,7 @@ fn mean(
         direction: directions[first],
         followed: std::array::from_fn(|over| mean(&|i| history.followed[i][over])),
         filtered: std::array::from_fn(|f| mean(&|i| history.filtered[i][f])),
-        rate: slope(&course),
+        rate: slope(&readings),
     })
 }
 
@@ -153,8 +154,8 @@ fn held_directions(stated: &[i8]) -> Vec<i8> {
         .collect()
 }
 
-/// Direction of the drive at settled points, by the turns of their pressure: single rows would turn with each ring.
-fn turns(points: &mut [Point]) {
+/// Direction of the drive at settled points, by the reversals of their pressure: single rows would turn with each ring.
+fn set_directions(points: &mut [Point]) {
     let pressure: Vec<f64> = points.iter().map(|p| p.pressure).collect();
     let way = motion::way(&pressure, STAIRCASE_TURN * range(&pressure), 0.0);
     points.iter_mut().zip(way).for_each(|(p, way)| p.direction = if way < 0.0 { -1 } else { 1 });

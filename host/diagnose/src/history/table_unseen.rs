@@ -46,8 +46,8 @@ pub struct UnseenErrors {
     pub slack_pct: f64,
 }
 
-/// What counts of each recording's readings.
-struct Counted {
+/// Which readings of each recording count.
+struct ReadingSelection {
     rings: Vec<Vec<bool>>,
     /// A reading up to this is slack, N.
     slack: f64,
@@ -96,7 +96,7 @@ fn reached(campaign: &Campaign) -> Vec<f64> {
     (0..tops.len()).map(of).collect()
 }
 
-impl Counted {
+impl ReadingSelection {
     fn of(campaign: &Campaign, zero: f64) -> Self {
         let rings = campaign.recordings.par_iter().map(valve_pulses::ringing).collect();
         let largest = largest_force(campaign).max(f64::MIN_POSITIVE);
@@ -196,46 +196,48 @@ pub fn unseen_by_table(
         return Ok(None);
     }
     let Some(whole) = Prepared::of(&settled, muscle, &vec![true; runs])? else { return Ok(None) };
-    let forms =
-        [(&settled, Counted::of(&settled, whole.zero)), (recorded, Counted::of(recorded, whole.zero))];
+    let forms = [
+        (&settled, ReadingSelection::of(&settled, whole.zero)),
+        (recorded, ReadingSelection::of(recorded, whole.zero)),
+    ];
     let fold = |used: &Vec<bool>| -> Result<[[Both; 4]; 2]> {
         let mut sums = [[Both::default(); 4]; 2];
         let Some(prepared) = Prepared::of(&settled, muscle, used)? else { return Ok(sums) };
         let tables = [prepared.base(), prepared.table(Layers::Contact)?, prepared.table(Layers::Memory)?];
         for (k, table) in tables.iter().enumerate() {
             let table = reread(table)?;
-            for (f, (form, counted)) in forms.iter().enumerate() {
+            for (f, (form, selection)) in forms.iter().enumerate() {
                 let predicted = predict(&table, form)?;
                 for r in (0..runs).filter(|r| !used[*r]) {
-                    counted.add(&mut sums[f][k], form, r, &predicted.recordings[r].force);
+                    selection.add(&mut sums[f][k], form, r, &predicted.recordings[r].force);
                 }
             }
         }
-        for (f, (form, counted)) in forms.iter().enumerate() {
+        for (f, (form, selection)) in forms.iter().enumerate() {
             sums[f][3] = match left_out {
                 LeftOut::Runs => sums[f][2],
-                LeftOut::Mountings => own_length(&reread(&tables[2])?, form, counted, used)?,
+                LeftOut::Mountings => own_length(&reread(&tables[2])?, form, selection, used)?,
             };
         }
         Ok(sums)
     };
     let parts: Vec<[[Both; 4]; 2]> = left_out.folds(&settled).par_iter().map(fold).collect::<Result<_>>()?;
     let form = |f: usize| {
-        let counted = &forms[f].1;
+        let selection = &forms[f].1;
         let total = |k: usize, of: fn(&Both) -> Sums| {
             parts.iter().map(|p| of(&p[f][k])).fold(Sums::default(), std::ops::Add::add)
         };
         let all = |k: usize| total(k, |both| both.all);
         let supported = |k: usize| total(k, |both| both.supported);
-        let rings = counted.rings.iter().flatten().filter(|r| **r).count() as f64;
-        let readings = counted.rings.iter().map(Vec::len).sum::<usize>().max(1) as f64;
+        let rings = selection.rings.iter().flatten().filter(|r| **r).count() as f64;
+        let readings = selection.rings.iter().map(Vec::len).sum::<usize>().max(1) as f64;
         UnseenErrors {
-            base: counted.size(all(0)),
-            without_memory: counted.size(all(1)),
-            with_memory: counted.size(all(2)),
-            with_own_length: counted.size(all(3)),
-            supported_without_memory: counted.size(supported(1)),
-            supported_with_memory: counted.size(supported(2)),
+            base: selection.size(all(0)),
+            without_memory: selection.size(all(1)),
+            with_memory: selection.size(all(2)),
+            with_own_length: selection.size(all(3)),
+            supported_without_memory: selection.size(supported(1)),
+            supported_with_memory: selection.size(supported(2)),
             ringing_pct: 100.0 * rings / readings,
             slack_pct: 100.0 * all(2).slack / all(2).count.max(1.0),
         }
@@ -244,7 +246,12 @@ pub fn unseen_by_table(
 }
 
 /// The errors of the recordings that are not used, with one shift of their length that gives the least.
-fn own_length(table: &TableFile, form: &Campaign, counted: &Counted, used: &[bool]) -> Result<Both> {
+fn own_length(
+    table: &TableFile,
+    form: &Campaign,
+    selection: &ReadingSelection,
+    used: &[bool],
+) -> Result<Both> {
     let mut best: Option<Both> = None;
     for step in 0..LENGTH_STEPS {
         let shift = LENGTH_ERROR * (2.0 * step as f64 / (LENGTH_STEPS - 1) as f64 - 1.0);
@@ -255,7 +262,7 @@ fn own_length(table: &TableFile, form: &Campaign, counted: &Counted, used: &[boo
         let predicted = predict(table, &shifted)?;
         let mut both = Both::default();
         for r in (0..used.len()).filter(|r| !used[*r]) {
-            counted.add(&mut both, form, r, &predicted.recordings[r].force);
+            selection.add(&mut both, form, r, &predicted.recordings[r].force);
         }
         if best.is_none_or(|b| both.all.squares < b.all.squares) {
             best = Some(both);

@@ -2,7 +2,7 @@
 //!
 //! The synthetic muscle is integrated here in small steps from the law's equations, apart from the code under test.
 
-mod beside;
+mod additional_effect;
 mod festo;
 mod synthetic;
 mod table;

@@ -37,7 +37,7 @@ pub(super) fn swings(r: &Recording) -> bool {
     if !(steps < COMBINED_SMOOTH * variance) {
         return false;
     }
-    let turns =
+    let reversals =
         motion::way(&r.stroke, COMBINED_SWING * travel, 0.0).windows(2).filter(|w| w[0] != w[1]).count();
     let (low, high) = extremes(&r.pressure);
     let mut at = vec![Vec::new(); COMBINED_LENGTHS];
@@ -45,7 +45,7 @@ pub(super) fn swings(r: &Recording) -> bool {
         at[bin(*p, low, high, COMBINED_LENGTHS)].push(*x);
     }
     let spread = at.iter().map(range).fold(0.0, f64::max);
-    turns >= COMBINED_TURNS && spread > COMBINED_SWING * travel
+    reversals >= COMBINED_TURNS && spread > COMBINED_SWING * travel
 }
 
 /// ∂F/∂x, N/m, over pressure and stroke; `None` where the reference has no data.
@@ -76,7 +76,9 @@ impl Plane {
         let mut bins = vec![[0.0; 4]; 2 * POINT_BINS * POINT_BINS];
         for r in &campaign.recordings {
             let force = r.require_force()?;
-            for (i, d) in motion::way(&r.stroke, motion::turn(range(&r.stroke)), 0.0).into_iter().enumerate()
+            for (i, d) in motion::way(&r.stroke, motion::reversal_threshold(range(&r.stroke)), 0.0)
+                .into_iter()
+                .enumerate()
             {
                 let at = bin(r.pressure[i], pressures.0, pressures.1, POINT_BINS) * POINT_BINS
                     + bin(r.stroke[i], strokes.0, strokes.1, POINT_BINS);
@@ -214,19 +216,19 @@ fn middles(campaign: &Campaign) -> Vec<f64> {
     (0..parts).map(|i| low + (high - low) * (i as f64 + 0.5) / parts as f64).collect()
 }
 
-/// The direction of every row by the stroke, and whether the row is far enough from the last turn for friction to have turned, too.
+/// The direction of every row by the stroke, and whether the row is far enough from the last reversal for friction to have turned, too.
 fn directions(stroke: &[f64]) -> (Vec<f64>, Vec<bool>) {
     let travel = range(stroke);
-    let direction = motion::way(stroke, motion::turn(travel), 0.0);
+    let direction = motion::way(stroke, motion::reversal_threshold(travel), 0.0);
     let mut start = stroke.first().copied().unwrap_or(0.0);
-    let mut turned = vec![false; stroke.len()];
+    let mut reversed = vec![false; stroke.len()];
     for i in 1..stroke.len() {
         if direction[i] != direction[i - 1] {
             start = stroke[i];
         }
-        turned[i] = (stroke[i] - start) * direction[i] > COMBINED_TURNED * travel;
+        reversed[i] = (stroke[i] - start) * direction[i] > COMBINED_TURNED * travel;
     }
-    (direction, turned)
+    (direction, reversed)
 }
 
 /// Adds the runs of one side, and says which part of AFTER lies beyond the lengths.
@@ -243,7 +245,7 @@ fn add(runs: &mut Runs, campaign: &Campaign, after: bool, slope: &Slope<'_>) -> 
     let (mut elapsed, mut number) = (0.0, 0);
     for r in &campaign.recordings {
         let force = r.require_force()?;
-        let (direction, turned) = directions(&r.stroke);
+        let (direction, reversed) = directions(&r.stroke);
         let duration = lasts(r);
         let spans = ((COMBINED_SPANS as f64 * duration / total).round() as usize).max(1);
         let mut members = vec![Vec::new(); spans * parts];
@@ -255,7 +257,7 @@ fn add(runs: &mut Runs, campaign: &Campaign, after: bool, slope: &Slope<'_>) -> 
                 out += 1;
                 continue;
             };
-            if turned[i] {
+            if reversed[i] {
                 let span = bin(r.time[i] - r.time[0], 0.0, duration, spans);
                 members[span * parts + bin(x, low, high, parts)].push((i, slope));
             }

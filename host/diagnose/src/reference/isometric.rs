@@ -88,7 +88,7 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let about = naming::About { runs: &runs, lags_first: tried, by };
     let named = naming::name(&about, &contrast, (&cells, &first));
-    let naming::Named { cells, accepted, last } = named;
+    let naming::NamedChanges { cells, accepted, last } = named;
     Ok(Analysis { runs, surface, cells, contrast, first, accepted, last, recorded, reference_error })
 }
 

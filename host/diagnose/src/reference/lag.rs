@@ -73,10 +73,10 @@ struct Scorer<'a> {
 
 /// Which rows show lags beside a change of friction: at a reversal its force jumps, and a jump at another row than the one
 /// that is taken for the reversal looks like a lag. `longest`: of the lags that are tried, s.
-fn clear_of_turns(run: &Run, longest: f64) -> Vec<bool> {
-    let turned = (1..run.time.len()).filter(|i| run.direction[*i] != run.direction[i - 1]);
-    let turns: Vec<f64> = turned.map(|i| run.time[i]).collect();
-    let clear = |t: &f64| turns.iter().all(|turn| t - turn < -longest || t - turn > LAG_AFTER_TURN * longest);
+fn clear_of_reversals(run: &Run, longest: f64) -> Vec<bool> {
+    let reversed = (1..run.time.len()).filter(|i| run.direction[*i] != run.direction[i - 1]);
+    let reversals: Vec<f64> = reversed.map(|i| run.time[i]).collect();
+    let clear = |t: &f64| reversals.iter().all(|r| t - r < -longest || t - r > LAG_AFTER_TURN * longest);
     run.time.iter().map(clear).collect()
 }
 
@@ -157,7 +157,7 @@ fn lowest(x: [f64; 3], y: [f64; 3]) -> f64 {
 fn score(run: &Run, surface: &Surface, first: usize, rubs: bool) -> Score {
     let usual = &LAGS[..first.clamp(1, LAGS.len())];
     let longest = usual[usual.len() - 1];
-    let clear = if rubs { clear_of_turns(run, longest) } else { vec![true; run.time.len()] };
+    let clear = if rubs { clear_of_reversals(run, longest) } else { vec![true; run.time.len()] };
     let scorer = Scorer::new(run, surface, &clear);
     let expected = scorer.forces(&run.pressure);
     let later = |lag: f64| scorer.forces(&delayed(&run.time, &run.pressure, lag));

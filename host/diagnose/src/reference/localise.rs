@@ -4,10 +4,10 @@ use nalgebra::DVector;
 
 use super::answer::{Moment, Place, Since};
 use super::cells::Cell;
-use super::course::Kind;
 use super::criteria::{CELLS, LOCALISE_STANDS_OUT};
 use super::isometric::Analysis;
 use super::naming::Accepted;
+use super::time_course::Kind;
 
 /// Shares of the energy by mounting, pressure, direction and recording, those that stand out.
 pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length: Option<f64>) -> Vec<Place> {
@@ -67,15 +67,17 @@ fn recording_at(analysis: &Analysis, clock: f64) -> String {
 
 /// Whether an accepted change was there from the first recording of AFTER, began at a moment, or grew.
 pub(super) fn since(analysis: &Analysis, accepted: &Accepted) -> Since {
-    let Some(course) = accepted.course.as_ref().filter(|c| c.sure) else { return Since::NotDetermined };
+    let Some(time_course) = accepted.time_course.as_ref().filter(|c| c.sure) else {
+        return Since::NotDetermined;
+    };
     let seconds = |clock: f64| clock * analysis.runs.duration;
     let moment = Moment {
-        recording: recording_at(analysis, course.start.at),
-        moment: seconds(course.start.at),
-        low: seconds(course.start.low),
-        high: seconds(course.start.high),
+        recording: recording_at(analysis, time_course.start.at),
+        moment: seconds(time_course.start.at),
+        low: seconds(time_course.start.low),
+        high: seconds(time_course.start.high),
     };
-    match course.kind {
+    match time_course.kind {
         Kind::Whole => Since::Beginning,
         Kind::Step => Since::From(moment),
         Kind::Ramp => Since::Gradual(moment),

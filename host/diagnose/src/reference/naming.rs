@@ -4,7 +4,6 @@ use nalgebra::DVector;
 
 use super::cells::{Cell, cells, rms_after, row};
 use super::contrast::Contrast;
-use super::course::{self, Course};
 use super::criteria::{
     COMBINED_SHAPE_ERROR, LAG_FLOOR, MOST_CHANGES, NAMED, NAMED_SHAPE_ERROR, OWN_SLOPE_ROUNDS, SIZES,
 };
@@ -15,6 +14,7 @@ use super::runs::{Run, Runs};
 use super::shapes::{Change, Class};
 use super::surface::Surface;
 use super::table_surface;
+use super::time_course::{self, TimeCourse};
 use super::weighing::{Inexact, Round, Weighing, weigh};
 
 /// A change that is named, with the shape that it has in the cells.
@@ -29,7 +29,7 @@ pub(super) struct Accepted {
     pub size: f64,
     pub std: f64,
     /// Since when; unknown for a lag.
-    pub course: Option<Course>,
+    pub time_course: Option<TimeCourse>,
 }
 
 /// What names depend on beside the cells.
@@ -41,8 +41,8 @@ pub(super) struct About<'a> {
     pub by: Weighing<'a>,
 }
 
-/// What was named.
-pub(super) struct Named {
+/// The changes that were named.
+pub(super) struct NamedChanges {
     /// With the trace of the lag that was tested last.
     pub cells: Vec<Cell>,
     pub accepted: Vec<Accepted>,
@@ -65,11 +65,11 @@ fn without(runs: &Runs, surface: &Surface, accepted: &[Accepted]) -> Runs {
             accepted
                 .iter()
                 .filter_map(|a| {
-                    let course = a.course.as_ref()?;
+                    let time_course = a.time_course.as_ref()?;
                     Some(
                         a.size
-                            * course.at(means.clock)
-                            * course::in_full(a.change, &means, run.direction[i])?,
+                            * time_course.at(means.clock)
+                            * time_course::in_full(a.change, &means, run.direction[i])?,
                     )
                 })
                 .sum()
@@ -81,7 +81,11 @@ fn without(runs: &Runs, surface: &Surface, accepted: &[Accepted]) -> Runs {
 }
 
 /// Names changes until none is more probable than not.
-pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Cell], &Round)) -> Named {
+pub(super) fn name(
+    about: &About<'_>,
+    contrast: &Contrast,
+    (given, first): (&[Cell], &Round),
+) -> NamedChanges {
     let by = about.by;
     let mut cells = given.to_vec();
     let mut shift = by.lag.copied();
@@ -98,7 +102,7 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
         let next = more.and_then(|(change, p)| accept(&cells, round, change, p, late));
         // A second change of the same kind is what the first one's shape is inexact by.
         let other = |n: &Accepted| accepted.iter().all(|a| a.change.class() != n.change.class());
-        let next = next.map(|n| with_course(&cells, &present, by.surface, n));
+        let next = next.map(|n| with_time_course(&cells, &present, by.surface, n));
         let next = next.map(|n| with_own_slopes(about.runs, &mut cells, &present, by.surface, n));
         let Some(next) = next.filter(other) else {
             let left = none < NAMED && !by.moving && !accepted.iter().any(|a| a.change.is_lag());
@@ -116,7 +120,7 @@ pub(super) fn name(about: &About<'_>, contrast: &Contrast, (given, first): (&[Ce
                 last = weigh(&cells, &beyond(&base, &accepted), without_lag).posterior;
             }
             refit(&base, &mut accepted, &cells);
-            return Named { cells, accepted, last };
+            return NamedChanges { cells, accepted, last };
         };
         if next.change.is_lag() {
             let trace = lag::trace(&cells);
@@ -148,16 +152,16 @@ fn both(cells: &[Cell], surface: &Surface, pair: &Pair) -> Vec<Accepted> {
     let one = |k: usize| {
         let (change, round, rest) = (pair.changes[k], &pair.rounds[k], &pair.rests[k]);
         let found = accept(cells, round, change, round.posterior.probability(Cause::Named(change)), 0.0)?;
-        Some(with_course(cells, rest, surface, found))
+        Some(with_time_course(cells, rest, surface, found))
     };
     (0..2).filter_map(one).collect()
 }
 
 fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late: f64) -> Option<Accepted> {
     let estimate = round.estimates.iter().find(|e| e.change == change)?;
-    let course = round.courses.iter().find(|c| c.0 == change).map(|c| c.1.clone());
-    let shape = match &course {
-        Some(course) => course.shape.clone(),
+    let time_course = round.time_courses.iter().find(|c| c.0 == change).map(|c| c.1.clone());
+    let shape = match &time_course {
+        Some(time_course) => time_course.shape.clone(),
         None => lag::trace(cells) / late.abs().max(1e-9),
     };
     let competitors = round.posterior.set().into_iter().filter_map(|c| match c {
@@ -171,28 +175,28 @@ fn accept(cells: &[Cell], round: &Round, change: Change, probability: f64, late:
         shape,
         size: estimate.size,
         std: estimate.std,
-        course,
+        time_course,
     })
 }
 
-/// The same change with its course and its size; the course where the spread of the runs is judged without the change.
-fn with_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
+/// The same change with its time course and its size; the time course where the spread of the runs is judged without the change.
+fn with_time_course(cells: &[Cell], present: &Contrast, surface: &Surface, found: Accepted) -> Accepted {
     if found.change.is_lag() {
         return found;
     }
     let sizes = SIZES.map(|s| s * surface.largest);
     let scale = present.without_shapes(std::slice::from_ref(&found.shape)).scale();
-    let candidate = course::candidate(cells, found.change);
-    let Some(course) = candidate.and_then(|c| course::of(cells, present, &c, scale, &sizes)) else {
+    let candidate = time_course::candidate(cells, found.change);
+    let Some(time_course) = candidate.and_then(|c| time_course::of(cells, present, &c, scale, &sizes)) else {
         return found;
     };
-    let (a, b) = present.products(&course.shape);
+    let (a, b) = present.products(&time_course.shape);
     if !(a > 0.0) {
         return found;
     }
     // The spread of the runs with the change in it: what the shape leaves is a part of it.
     let std = (present.scale() / a).sqrt();
-    Accepted { shape: course.shape.clone(), size: b / a, std, course: Some(course), ..found }
+    Accepted { shape: time_course.shape.clone(), size: b / a, std, time_course: Some(time_course), ..found }
 }
 
 /// A slip beside a table with the slopes that AFTER shows once the slip is taken out of it: with the slip in them they are too small or
@@ -214,7 +218,7 @@ fn with_own_slopes(
         table_surface::fill_own_slopes(&mut own, &freed);
         let with = traced(runs, &own, 0.0);
         cells.iter_mut().zip(with).for_each(|(c, w)| c.means.step_by_stroke = w.means.step_by_stroke);
-        found = with_course(cells, present, surface, found);
+        found = with_time_course(cells, present, surface, found);
     }
     found
 }
@@ -251,7 +255,7 @@ fn revisit(cells: &[Cell], base: &Contrast, by: Weighing<'_>, accepted: &mut [Ac
             continue;
         }
         let Some(found) = accept(cells, &round, change, probability, 0.0) else { continue };
-        accepted[i] = with_course(cells, &rest, by.surface, found);
+        accepted[i] = with_time_course(cells, &rest, by.surface, found);
         changed = true;
     }
     changed

@@ -13,8 +13,8 @@ use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
 use super::surface::Surface;
-use super::withdrawal::withdraw;
-use super::{catalogue, closed_valves, combined, sides, stages, table_surface, units};
+use super::withdrawn_findings::withdraw;
+use super::{catalogue, closed_valves, combined, input_checks, stages, table_surface, units};
 use model_core::braid::Geometry;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::{self, Campaign, Recording};
@@ -159,11 +159,11 @@ fn beside_recordings(
     for r in &whole.recordings {
         r.require_force()?;
     }
-    sides::apart(whole, given)?;
-    sides::one_actuator(whole, given)?;
+    input_checks::refuse_shared_rows(whole, given)?;
+    input_checks::one_actuator(whole, given)?;
     let before = &stages::parted(whole);
     let mut remarks = units::check(before, after)?;
-    remarks.extend(sides::order(before, after));
+    remarks.extend(input_checks::order_remark(before, after));
     let described = options.geometry.as_ref().filter(|_| kind != Protocol::Held);
     let (mut report, loss) = match described {
         Some(geometry) => (catalogue::compare(whole, given, geometry, options)?, None),

@@ -42,7 +42,7 @@ pub struct About {
     pub changed: Changed,
 }
 
-/// Every change that settled cells show by a fixed shape or a course, in the order in which they are tested.
+/// Every change that settled cells show by a fixed shape or a time course, in the order in which they are tested.
 pub(crate) const CHANGES: [Change; 15] = [
     Change::ForceOffset,
     Change::ForceGain,

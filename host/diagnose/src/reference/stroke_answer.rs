@@ -34,7 +34,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
     };
     let unseen = Unseen { before, after, held: true };
     let places = if verdict == Verdict::Consistent { Vec::new() } else { stroke_places(compared) };
-    let mut probabilities: Vec<Probability> = stroked::ASKED
+    let mut probabilities: Vec<Probability> = stroked::TESTED
         .iter()
         .map(|c| Probability { cause: c.name().into(), probability: weighed.marginal(*c) })
         .chain([Probability { cause: "none".into(), probability: weighed.none() }])
@@ -58,7 +58,7 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
             share_where_shown: unseen.share(),
             noise_N: noise,
         },
-        considered: stroked::ASKED
+        considered: stroked::TESTED
             .iter()
             .filter(|c| !named.contains(c))
             .map(|c| Considered {
@@ -109,9 +109,9 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
     let about = change.about();
     let (value, std) = weighed.sizes.get(&change).copied().unwrap_or_default();
     let (before, after) = stroked::unseen(compared, &[change]);
-    let index = stroked::ASKED.iter().position(|c| *c == change).unwrap_or(0);
+    let index = stroked::TESTED.iter().position(|c| *c == change).unwrap_or(0);
     let shape = &compared.shapes[index];
-    let mut competitors: Vec<String> = stroked::ASKED
+    let mut competitors: Vec<String> = stroked::TESTED
         .iter()
         .filter(|c| **c != change && c.class() == about.changed.class && weighed.marginal(**c) >= POSSIBLE)
         .map(|c| c.name().to_owned())
@@ -167,7 +167,7 @@ fn stroke_curves(c: &Compared, weighed: &Weighed, named: &[Change]) -> Vec<Curve
         named
             .iter()
             .filter_map(|change| {
-                let index = stroked::ASKED.iter().position(|a| a == change)?;
+                let index = stroked::TESTED.iter().position(|a| a == change)?;
                 Some(weighed.sizes.get(change)?.0 * c.shapes[index][i])
             })
             .sum()

@@ -34,7 +34,7 @@ pub(crate) struct StrokeRepeats {
 }
 
 /// The changes that are tested for strokes at regulated pressures.
-pub(super) const ASKED: [Change; 4] =
+pub(super) const TESTED: [Change; 4] =
     [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
 
 /// The differences of both campaigns.
@@ -46,7 +46,7 @@ pub(super) struct Compared {
     /// Middles first, then halves, N.
     pub y: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Columns of [`ASKED`], N per unit.
+    /// Columns of [`TESTED`], N per unit.
     pub shapes: Vec<DVector<f64>>,
     pub largest: f64,
     pub not_comparable: Vec<NotComparable>,
@@ -147,7 +147,7 @@ pub(super) fn compare(before: &Campaign, after: &Campaign, reference_error: f64)
         };
         DVector::from_fn(2 * n, |i, _| of(i))
     };
-    let shapes = ASKED.iter().map(|c| column(*c)).collect();
+    let shapes = TESTED.iter().map(|c| column(*c)).collect();
     let covariance = covariance(&keys, &before, &after, largest, reference_error);
     Ok(Compared { keys, levels, before, after, y, covariance, shapes, largest, not_comparable })
 }
@@ -233,17 +233,17 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
     let sets: Vec<(Vec<Change>, f64)> = STROKE_SETS
         .iter()
         .zip(&logs)
-        .map(|(s, l)| (s.iter().map(|k| ASKED[*k]).collect(), (l - total).exp()))
+        .map(|(s, l)| (s.iter().map(|k| TESTED[*k]).collect(), (l - total).exp()))
         .collect();
     let of = |index: usize| -> BTreeMap<Change, (f64, f64)> {
         let Some((sizes, inverse)) = &fits[index] else { return BTreeMap::new() };
         let one = |(i, k): (usize, &usize)| {
             let unit = rms[*k].max(f64::MIN_POSITIVE);
-            (ASKED[*k], (sizes[i] / unit, inverse[(i, i)].max(0.0).sqrt() / unit))
+            (TESTED[*k], (sizes[i] / unit, inverse[(i, i)].max(0.0).sqrt() / unit))
         };
         STROKE_SETS[index].iter().enumerate().map(one).collect()
     };
-    let alone = (1..=ASKED.len()).flat_map(of).collect();
+    let alone = (1..=TESTED.len()).flat_map(of).collect();
     let mut weighed = Weighed { sets, sizes: BTreeMap::new(), alone };
     let named = named(&weighed);
     let holds = |i: &usize| named.iter().all(|n| weighed.sets[*i].0.contains(n));
@@ -262,7 +262,7 @@ pub(super) fn named(weighed: &Weighed) -> Vec<Change> {
     let mut all = Vec::new();
     for class in [Class::Gain, Class::Friction, Class::Zero] {
         if weighed.class(class) >= super::criteria::NAMED {
-            let mut own = ASKED.iter().copied().filter(|c| c.class() == class);
+            let mut own = TESTED.iter().copied().filter(|c| c.class() == class);
             let first = own.next();
             let best = own.fold(first, |best, c| match best {
                 Some(b) if weighed.marginal(b) >= weighed.marginal(c) => Some(b),
@@ -277,7 +277,7 @@ pub(super) fn named(weighed: &Weighed) -> Vec<Change> {
 /// rms of the difference without and with the changes, fitted to every other level (or part of the stroke) and judged on the rest, N.
 pub(super) fn unseen(c: &Compared, changes: &[Change]) -> (f64, f64) {
     let rms = |v: &DVector<f64>| (v.norm_squared() / v.len().max(1) as f64).sqrt();
-    let columns: Vec<DVector<f64>> = ASKED
+    let columns: Vec<DVector<f64>> = TESTED
         .iter()
         .zip(&c.shapes)
         .filter(|(a, _)| changes.contains(a))

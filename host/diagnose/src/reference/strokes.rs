@@ -70,7 +70,7 @@ pub(super) fn unrest(recording: &Recording) -> f64 {
 
 /// Rows and mean pressure of every stroke.
 fn strokes(recording: &Recording) -> Vec<(std::ops::Range<usize>, f64, f64)> {
-    let direction = motion::way(&recording.stroke, motion::turn(range(&recording.stroke)), 0.0);
+    let direction = motion::way(&recording.stroke, motion::reversal_threshold(range(&recording.stroke)), 0.0);
     let mut all = Vec::new();
     let mut start = 0;
     for i in 1..=direction.len() {

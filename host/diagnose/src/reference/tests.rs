@@ -199,13 +199,13 @@ fn a_length_beyond_those_of_the_reference_is_not_compared() {
     assert!(!report.remarks.iter().any(|r| matches!(r, Remark::Interpolated { .. })));
 }
 
-/// A zero of 13 N that `course` gives its size over the time of AFTER, s.
-fn zero_over_time(course: impl Fn(f64) -> f64) -> ChangeReport {
+/// A zero of 13 N that `factor` gives its size over the time of AFTER, s.
+fn zero_over_time(factor: impl Fn(f64) -> f64) -> ChangeReport {
     let before = campaign(3, 0..3, &untouched);
     let mut after = campaign(3, 3..6, &untouched);
     let mut begin = 0.0;
     for r in &mut after.recordings {
-        let zeros = r.time.iter().map(|t| 13.0 * course(begin + t)).collect::<Vec<f64>>();
+        let zeros = r.time.iter().map(|t| 13.0 * factor(begin + t)).collect::<Vec<f64>>();
         r.force.as_mut().unwrap().iter_mut().zip(zeros).for_each(|(f, z)| *f += z);
         begin += r.duration();
     }

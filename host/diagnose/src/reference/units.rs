@@ -9,7 +9,7 @@ use pam_data::statistics::range;
 /// The factor that a ratio is near to, either way round.
 fn factor(ratio: f64) -> Option<&'static str> {
     let near = |f: f64| (ratio / f - 1.0).abs() < UNIT_NEAR || (ratio * f - 1.0).abs() < UNIT_NEAR;
-    UNIT_FACTORS.iter().find(|(f, _)| near(*f)).map(|(_, words)| *words)
+    UNIT_FACTORS.iter().find(|(f, _)| near(*f)).map(|(_, text)| *text)
 }
 
 fn columns(campaign: &Campaign) -> (Vec<f64>, Vec<f64>) {
@@ -37,11 +37,12 @@ pub(super) fn check(before: &Campaign, after: &Campaign) -> Result<Vec<Remark>> 
             )
             .help("a constant reading holds no information; look at its cable and at the column"));
         }
-        if let Some(words) = factor(range(a) / range(b)).filter(|_| factor(largest(a) / largest(b)).is_some())
+        if let Some(factor) =
+            factor(range(a) / range(b)).filter(|_| factor(largest(a) / largest(b)).is_some())
         {
             return Err(Error::new(
                 DataCode::RecordingUnknownUnit,
-                format!("the {what} of AFTER and of the reference differ by a factor of about {words}"),
+                format!("the {what} of AFTER and of the reference differ by a factor of about {factor}"),
             )
             .help(format!(
                 "AFTER reaches {:.4}, the reference {:.4} (SI); put the unit that was logged into the column's name, or scale it in an import description",
@@ -82,9 +83,9 @@ fn same_unit(what: &str, found: f64, known: f64) -> Result<()> {
     let far = ratio > FORCE_RATIO.1 || ratio * UNIT_FAR < 1.0;
     match factor(ratio).filter(|_| far) {
         None => Ok(()),
-        Some(words) => Err(Error::new(
+        Some(factor) => Err(Error::new(
             DataCode::RecordingUnknownUnit,
-            format!("the {what} of AFTER and of the table differ by a factor of about {words}"),
+            format!("the {what} of AFTER and of the table differ by a factor of about {factor}"),
         )
         .help(format!(
             "AFTER reaches {found:.4}, the table {known:.4} (SI); put the unit that was logged into the column's name, or scale it in an import description"

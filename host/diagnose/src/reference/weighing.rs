@@ -1,16 +1,16 @@
-//! One weighing of all changes: how strongly the cells support each, with the course through AFTER that suits it best.
+//! One weighing of all changes: how strongly the cells support each, with the time course through AFTER that suits it best.
 
 use nalgebra::DVector;
 
 use super::cells::{Cell, rms_after};
 use super::contrast::{Contrast, evidence};
-use super::course::{self, Candidate, Course, Kind};
 use super::criteria::{LAG_CONTRADICTED, LAG_CORRECTED, SIZES};
-use super::gate::{self, GatedChange};
 use super::lag::{self, Shift};
+use super::leave_one_mounting_out::{self, WeighedChange};
 use super::posterior::{Cause, Posterior};
 use super::shapes::{CHANGES, Change};
 use super::surface::Surface;
+use super::time_course::{self, Candidate, Kind, TimeCourse};
 use super::unknown;
 
 /// The size of a change if it is the only one left, SI.
@@ -27,8 +27,8 @@ pub(super) struct Estimate {
 pub(super) struct Round {
     pub posterior: Posterior,
     pub estimates: Vec<Estimate>,
-    /// The best course of every change that settled cells show.
-    pub courses: Vec<(Change, Course)>,
+    /// The best time course of every change that settled cells show.
+    pub time_courses: Vec<(Change, TimeCourse)>,
     pub local: Option<(usize, f64)>,
     /// Log evidence of the best name.
     pub best: f64,
@@ -67,12 +67,12 @@ pub(super) struct Weighing<'a> {
     pub prior_none: f64,
 }
 
-/// A change with the courses with which it is tested. Parts of a motion overlap in time: there only a slip has another course than the whole.
+/// A change with the time courses with which it is tested. Parts of a motion overlap in time: there only a slip has another time course than the whole.
 fn candidate(cells: &[Cell], change: Change, moving: bool) -> Option<Candidate> {
     if moving && change != Change::EndSlip {
         return Some(Candidate { shape: whole(cells, change)?, kinds: &[Kind::Whole] });
     }
-    course::candidate(cells, change)
+    time_course::candidate(cells, change)
 }
 
 /// The shape of a change that was there from the beginning of AFTER.
@@ -95,28 +95,28 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
     let sizes = SIZES.map(|s| s * by.surface.largest);
     let still = by.lag.map_or(0.0, |l| l.unchanged);
     let mut estimates = Vec::new();
-    let mut courses: Vec<(Change, Course)> = Vec::new();
+    let mut time_courses: Vec<(Change, TimeCourse)> = Vec::new();
     for change in CHANGES {
         let candidate = candidate(cells, change, by.moving);
-        let course = candidate.and_then(|c| course::of(cells, contrast, &c, scale, &sizes));
-        let Some(course) = course.filter(|c| c.log.is_finite()) else { continue };
-        let shape = whole(cells, change).unwrap_or_else(|| course.shape.clone());
+        let time_course = candidate.and_then(|c| time_course::of(cells, contrast, &c, scale, &sizes));
+        let Some(time_course) = time_course.filter(|c| c.log.is_finite()) else { continue };
+        let shape = whole(cells, change).unwrap_or_else(|| time_course.shape.clone());
         estimates.extend(estimate(cells, contrast, change, &shape));
-        courses.push((change, course));
+        time_courses.push((change, time_course));
     }
     let units: Vec<DVector<f64>> =
-        courses.iter().map(|(_, c)| &c.shape / rms_after(cells, &c.shape)).collect();
-    let mut changes: Vec<GatedChange<'_>> = courses
+        time_courses.iter().map(|(_, c)| &c.shape / rms_after(cells, &c.shape)).collect();
+    let mut changes: Vec<WeighedChange<'_>> = time_courses
         .iter()
         .zip(&units)
-        .map(|((change, course), shape)| GatedChange {
+        .map(|((change, time_course), shape)| WeighedChange {
             change: *change,
             shape,
-            log: course.log,
-            begins: course.start.at > 0.0,
+            log: time_course.log,
+            begins: time_course.start.at > 0.0,
         })
         .collect();
-    gate::limit(cells, contrast, &mut changes, &sizes);
+    leave_one_mounting_out::limit(cells, contrast, &mut changes, &sizes);
     let mut all: Vec<(Cause, f64)> =
         changes.iter().map(|a| (Cause::Named(a.change), a.log + still)).collect();
     all.push((Cause::None, still));
@@ -136,7 +136,7 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
         best,
         posterior: Posterior::of(&all, by.prior_none),
         estimates,
-        courses,
+        time_courses,
         local: unknown.and_then(|u| u.local),
     }
 }

@@ -141,7 +141,7 @@ impl Law<'_> {
 
 /// Mean square error of the model on some of the rows, N².
 fn error(rows: &Rows) -> f64 {
-    let rows = rows.thinned(rows.len().div_ceil(HELD_ROWS).max(1));
+    let rows = rows.downsampled(rows.len().div_ceil(HELD_ROWS).max(1));
     baselines::fit(&rows, Kind::Stiff, &[]).per_row(&rows)
 }
 

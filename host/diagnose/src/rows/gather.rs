@@ -128,14 +128,15 @@ struct Readings<'a> {
 /// A frame that gives takes a reversal before the muscle does: until that has come back from where it was, its direction is in doubt.
 fn doubt_until_the_muscle_turns(state: &mut MotionState, motion: &Motion, recording: &Recording) {
     let stroke = &recording.stroke;
-    for turn in motion.turns.iter().filter(|t| t.cause == Cause::Stroke) {
-        let Some(last) = turn.index.checked_sub(1) else { continue };
+    for reversal in motion.reversals.iter().filter(|t| t.cause == Cause::Stroke) {
+        let Some(last) = reversal.index.checked_sub(1) else { continue };
         let came_back = |i: &usize| {
-            (stroke[*i] - stroke[last]) * f64::from(turn.direction) > TURNED_BACK * motion.stroke_threshold
+            (stroke[*i] - stroke[last]) * f64::from(reversal.direction)
+                > TURNED_BACK * motion.stroke_threshold
         };
-        let end = (turn.index..stroke.len()).take(TURN_SAMPLES).find(came_back);
-        let end = end.unwrap_or((turn.index + TURN_SAMPLES).min(stroke.len()));
-        state.sure[turn.index..end].fill(false);
+        let end = (reversal.index..stroke.len()).take(TURN_SAMPLES).find(came_back);
+        let end = end.unwrap_or((reversal.index + TURN_SAMPLES).min(stroke.len()));
+        state.sure[reversal.index..end].fill(false);
     }
 }
 
@@ -198,7 +199,7 @@ impl Gathering<'_> {
         self.braid.posture(Length::from_metres(middle)).area
     }
 
-    /// Where the row that begins at a sample ends: before the next turn, hold or ramp, where a ring begins or ends, or when it is full.
+    /// Where the row that begins at a sample ends: before the next reversal, hold or ramp, where a ring begins or ends, or when it is full.
     fn row_end(&self, moved: Moved<'_>, i: usize) -> usize {
         let Moved { state, ringing, .. } = moved;
         let alike = |j: usize| {
@@ -206,7 +207,7 @@ impl Gathering<'_> {
                 && state.sure[j] == state.sure[i]
                 && state.ramped[j] == state.ramped[i]
                 && state.on_ramp[j] == state.on_ramp[i]
-                && state.turns[j] == state.turns[i]
+                && state.reversals[j] == state.reversals[i]
                 && ringing[j] == ringing[i]
         };
         // One row is enough for what is set aside; memory effects see its mean.

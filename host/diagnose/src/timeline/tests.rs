@@ -1,6 +1,6 @@
-//! Courses of simulated series, and timelines of simulated actuators.
+//! Change points of simulated series, and timelines of simulated actuators.
 
-use super::course::{How, find};
+use super::change_points::{How, find};
 use super::series::{Kind, Point, Quantity, Series};
 use super::{Options, Visit, timeline};
 use pam_data::date::DateSource;
@@ -53,18 +53,18 @@ fn a_step_is_found_where_it_is_and_a_slope_is_called_gradual() {
         let at = n / 2;
         let stepped: Vec<f64> =
             (0..n).map(|i| 100.0 + noise.normal() + if i >= at { 12.0 } else { 0.0 }).collect();
-        let course = find(&dates(n), &series(&stepped, 1.0));
-        let change = course.changes.first().unwrap();
-        assert_eq!((change.how, change.from, change.to), (How::AtOnce, at - 1, at), "{n}: {course:?}");
+        let change_points = find(&dates(n), &series(&stepped, 1.0));
+        let change = change_points.changes.first().unwrap();
+        assert_eq!((change.how, change.from, change.to), (How::AtOnce, at - 1, at), "{n}: {change_points:?}");
         assert!((change.size - 12.0).abs() < 3.0 * change.std, "{change:?}");
         let sloped: Vec<f64> =
             (0..n).map(|i| 100.0 + noise.normal() + 24.0 * i as f64 / (n - 1) as f64).collect();
-        let course = find(&dates(n), &series(&sloped, 1.0));
-        let change = course.changes.first().unwrap();
+        let change_points = find(&dates(n), &series(&sloped, 1.0));
+        let change = change_points.changes.first().unwrap();
         assert_eq!(
-            (course.changes.len(), change.how, change.from, change.to),
+            (change_points.changes.len(), change.how, change.from, change.to),
             (1, How::Gradual, 0, n - 1),
-            "{course:?}"
+            "{change_points:?}"
         );
         assert!((change.size - 24.0).abs() < 4.0 * change.std, "{change:?}");
     }
@@ -73,12 +73,13 @@ fn a_step_is_found_where_it_is_and_a_slope_is_called_gradual() {
 #[test]
 fn two_steps_are_two_changes_and_a_return_is_found() {
     let values = [100.0, 100.4, 99.7, 100.1, 115.0, 114.6, 115.3, 115.1, 99.8, 100.2, 100.0, 99.9];
-    let course = find(&dates(12), &series(&values, 0.4));
-    let steps: Vec<(usize, usize)> = course.changes.iter().map(|c| (c.from, c.to)).collect();
-    assert_eq!(steps, [(3, 4), (7, 8)], "{course:?}");
+    let change_points = find(&dates(12), &series(&values, 0.4));
+    let steps: Vec<(usize, usize)> = change_points.changes.iter().map(|c| (c.from, c.to)).collect();
+    assert_eq!(steps, [(3, 4), (7, 8)], "{change_points:?}");
     assert!(
-        (course.changes[0].size - 15.0).abs() < 0.5 && (course.changes[1].size + 15.0).abs() < 0.5,
-        "{course:?}"
+        (change_points.changes[0].size - 15.0).abs() < 0.5
+            && (change_points.changes[1].size + 15.0).abs() < 0.5,
+        "{change_points:?}"
     );
 }
 
@@ -89,8 +90,8 @@ fn few_equal_or_missing_values_are_no_change_and_do_not_fail() {
     assert!(find(&dates(8), &series(&[f64::NAN; 8], 1.0)).too_few);
     // All dates the same: the order counts.
     let rising: Vec<f64> = (0..8).map(|i| 10.0 * f64::from(i)).collect();
-    let course = find(&[0.0; 8], &series(&rising, 1.0));
-    assert_eq!(course.changes.first().map(|c| c.how), Some(How::Gradual), "{course:?}");
+    let change_points = find(&[0.0; 8], &series(&rising, 1.0));
+    assert_eq!(change_points.changes.first().map(|c| c.how), Some(How::Gradual), "{change_points:?}");
 }
 
 /// Pressure sweeps of an actuator without equations of the model, held at two lengths, two runs each.
@@ -124,7 +125,7 @@ fn visit(index: usize, offset: f64, friction: f64, threshold: f64) -> Visit {
     Visit { name: format!("campaign {index}"), date: dates(40)[index], dated_by: DateSource::Name, campaign }
 }
 
-fn course_of(t: &super::Timeline, quantity: Quantity) -> &super::course::Course {
+fn change_points_of(t: &super::Timeline, quantity: Quantity) -> &super::change_points::ChangePoints {
     let of = |s: &Series| s.what == super::series::What::Quantity(quantity);
     &t.series.iter().find(|(s, _)| of(s)).unwrap().1
 }
@@ -147,13 +148,13 @@ fn an_actuator_that_stays_has_no_changes() {
 fn an_offset_that_comes_with_one_campaign_is_dated_and_named() {
     let visits: Vec<Visit> = (0..6).map(|i| visit(i, if i >= 4 { 15.0 } else { 0.0 }, 0.02, 60e3)).collect();
     let t = timeline(&visits, &Options::default()).unwrap();
-    let (series, course) = t.of_kind(Kind::Effect).next().unwrap();
+    let (series, change_points) = t.of_kind(Kind::Effect).next().unwrap();
     assert_eq!(
         series.what,
         super::series::What::Effect { name: "force-offset".into(), parameter: "offset".into() }
     );
-    let change = course.changes.first().unwrap();
-    assert_eq!((change.how, change.from, change.to), (How::AtOnce, 3, 4), "{course:?}");
+    let change = change_points.changes.first().unwrap();
+    assert_eq!((change.how, change.from, change.to), (How::AtOnce, 3, 4), "{change_points:?}");
     assert!((change.size - 15.0).abs() < 1.5, "{change:?}");
 }
 
@@ -161,13 +162,13 @@ fn an_offset_that_comes_with_one_campaign_is_dated_and_named() {
 fn friction_that_grows_is_gradual() {
     let visits: Vec<Visit> = (0..8).map(|i| visit(i, 0.0, 0.02 + 0.01 * i as f64, 60e3)).collect();
     let t = timeline(&visits, &Options::default()).unwrap();
-    let course = course_of(&t, Quantity::Hysteresis);
+    let change_points = change_points_of(&t, Quantity::Hysteresis);
     assert_eq!(
-        course.changes.first().map(|c| (c.how, c.from, c.to)),
+        change_points.changes.first().map(|c| (c.how, c.from, c.to)),
         Some((How::Gradual, 0, 7)),
-        "{course:?}"
+        "{change_points:?}"
     );
-    let largest = course_of(&t, Quantity::LargestForce);
+    let largest = change_points_of(&t, Quantity::LargestForce);
     assert!(largest.changes.is_empty(), "{:#?}", t.of_kind(Kind::Measured).next());
 }
 

@@ -61,12 +61,12 @@ impl Effect for SensorDelay {
             // The force during a pause is unknown; the reading has caught up with it since.
             memory.fill(T::ZERO);
         }
-        match turn(context, memory) {
-            Some(turn) => {
-                catch_up(memory, time, (context.dt - turn.since).max(T::ZERO), turn.before);
-                Filter::step(memory, T::ZERO, &[time], &[turn.after]);
-                add(memory, turn.after);
-                catch_up(memory, time, turn.since, context.force());
+        match reversal(context, memory) {
+            Some(reversal) => {
+                catch_up(memory, time, (context.dt - reversal.since).max(T::ZERO), reversal.before);
+                Filter::step(memory, T::ZERO, &[time], &[reversal.after]);
+                add(memory, reversal.after);
+                catch_up(memory, time, reversal.since, context.force());
             }
             None => catch_up(memory, time, context.dt, context.force()),
         }
@@ -84,8 +84,8 @@ impl Effect for SensorDelay {
     }
 }
 
-/// A turn between the moment before and this one, where friction jumps.
-struct Turn<T> {
+/// A reversal between the moment before and this one, where friction jumps.
+struct Reversal<T> {
     /// Time since, s.
     since: T,
     /// Forces on either side of it, N.
@@ -95,7 +95,7 @@ struct Turn<T> {
 
 /// The reversal since the last sample, if any: where the strokes before and after it meet, each extrapolated at its speed; halfway if they
 /// do not move towards it.
-fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> {
+fn reversal<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Reversal<T>> {
     let came = memory[WAY];
     let (speed, dt) = (memory[SPEED], context.dt);
     let ways = came * context.direction < T::ZERO;
@@ -108,7 +108,7 @@ fn turn<T: Scalar>(context: &Context<T>, memory: &Memory<T>) -> Option<Turn<T>> 
     let since = dt - until;
     let pull = context.quasi - context.stiffness * context.speed * since;
     let going = |way: T| Context { direction: way, ..*context }.rubbed(pull);
-    Some(Turn { since, before: going(came), after: going(context.direction) })
+    Some(Reversal { since, before: going(came), after: going(context.direction) })
 }
 
 /// Lets `dt` seconds pass in the filter and for the knots of the force, which ran straight to `force`.

@@ -39,7 +39,7 @@ impl Loss {
 
     /// The rate with its interval, as text with practical units.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         format!(
             "behind the closed valve {:.3} ± {:.3} % of the pressure is lost per second, which costs at least {:.2} % of the pressure at \
              the muscle",

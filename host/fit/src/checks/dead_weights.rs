@@ -49,7 +49,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         parameters: vec![gain, 0.0],
         deviations: vec![Some(uncertain.deviation), None],
         freedom: uncertain.freedom,
-        words: format!(
+        text: format!(
             "the cell reads {:+.2} ± {:.2} % of the load",
             100.0 * gain,
             100.0 * uncertain.half_width()
@@ -65,7 +65,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
             parameters: vec![thrust],
             deviations: vec![Some(uncertain.deviation)],
             freedom: uncertain.freedom,
-            words: format!(
+            text: format!(
                 "the line pushes with {:+.3} ± {:.3} N per 100 kPa",
                 1e5 * thrust,
                 1e5 * uncertain.half_width()

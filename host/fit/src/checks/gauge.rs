@@ -30,7 +30,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         parameters: vec![missing, 0.0],
         deviations: vec![Some(uncertain.deviation), None],
         freedom: uncertain.freedom,
-        words: format!(
+        text: format!(
             "the muscle has {:+.2} ± {:.2} % of what the gauge reads",
             100.0 * missing,
             100.0 * uncertain.half_width()

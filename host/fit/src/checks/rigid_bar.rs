@@ -43,7 +43,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         parameters: vec![give, give],
         deviations: vec![Some(give_known.deviation), None],
         freedom: give_known.freedom,
-        words: format!(
+        text: format!(
             "the frame gives {:.2} ± {:.2} µm per newton",
             1e6 * found.values[0],
             1e6 * give_known.half_width()
@@ -59,7 +59,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
             parameters: vec![1.0, play, 0.1],
             deviations: vec![None, Some(play_known.deviation), None],
             freedom: play_known.freedom,
-            words: format!(
+            text: format!(
                 "the joint has a play of {:.3} ± {:.3} mm",
                 1e3 * found.values[2],
                 1e3 * play_known.half_width()
@@ -71,7 +71,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
             parameters: vec![zero],
             deviations: vec![Some(zero_known.deviation)],
             freedom: zero_known.freedom,
-            words: format!(
+            text: format!(
                 "the stroke reads {:+.3} ± {:.3} mm too little",
                 1e3 * zero,
                 1e3 * zero_known.half_width()

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::file_kind::FileKind;
 use pam_data::pluralise::pluralise;
-use pam_data::recording::{Named, Quantity, named};
+use pam_data::recording::{HeaderName, Quantity, parse_header};
 
 /// The prefix of the column that holds the reference.
 const REFERENCE: &str = "reference_";
@@ -48,12 +48,12 @@ impl Table {
         let mut states: Vec<(&'static str, Vec<f64>)> = states_at.iter().map(|s| (s.1, Vec::new())).collect();
         for (at, name) in header.iter().enumerate() {
             let (reference, name) = name.strip_prefix(REFERENCE).map_or((false, name), |n| (true, n));
-            match named(name) {
-                Named::Known(quantity, unit) => {
+            match parse_header(name) {
+                HeaderName::Known(quantity, unit) => {
                     wanted.push((at, unit));
                     columns.push((quantity, reference, Vec::new()));
                 }
-                Named::UnknownUnit(quantity) => {
+                HeaderName::UnknownUnit(quantity) => {
                     return Err(Error::new(
                         DataCode::CheckInvalid,
                         format!("unknown unit of the column `{}`", &header[at]),
@@ -61,7 +61,7 @@ impl Table {
                     .file(file)
                     .help(format!("{} is in {}", quantity.name(), quantity.unit_list())));
                 }
-                Named::Other => {}
+                HeaderName::Other => {}
             }
         }
         for row in reader.records() {

@@ -31,7 +31,7 @@ pub(super) fn measure(table: &Table) -> Result<Vec<Measured>> {
         parameters: vec![-found.values[0] / GRAVITY, 0.0],
         deviations: vec![Some(uncertain.deviation / GRAVITY), None],
         freedom: uncertain.freedom,
-        words: format!(
+        text: format!(
             "muscle and fittings add {:+.3} ± {:.3} N to the reading",
             found.values[0],
             uncertain.half_width()

@@ -21,7 +21,7 @@ pub(super) fn despike(campaign: &Campaign, points: &mut Points) -> Vec<Outlier> 
         return found;
     }
     for index in 0..points.list.len() {
-        let reversals = points.beside_turn(index);
+        let reversals = points.beside_reversal(index);
         let p = &mut points.list[index];
         if p.dropout || p.rows < 3 || p.force_range.1 - p.force_range.0 < 6.0 * typical {
             continue;
@@ -89,7 +89,7 @@ pub(super) fn find(problem: &Problem, screen: &Screen, parameters: &[f64]) -> Sc
             continue;
         }
         // Beside a reversal they are rows of the other branch, not spikes.
-        if points.beside_turn(start).0 || points.beside_turn(i - 1).1 {
+        if points.beside_reversal(start).0 || points.beside_reversal(i - 1).1 {
             found.used[start..i].fill(PointUse::NearReversal);
             continue;
         }

@@ -33,7 +33,7 @@ pub struct Point {
     /// Lowest and highest force among its rows, N; spikes show here.
     pub force_range: (f64, f64),
     /// Distance from the last reversal, or from the start of the recording, as a share of the ranges of stroke and pressure.
-    pub since_turn: f64,
+    pub since_reversal: f64,
     /// Whether the pressure sensor failed: the pressure is interpolated.
     pub dropout: bool,
 }
@@ -168,10 +168,10 @@ impl Points {
 
     /// Whether a reversal of the motion lies just before and just after a point.
     #[must_use]
-    pub(crate) fn beside_turn(&self, i: usize) -> (bool, bool) {
+    pub(crate) fn beside_reversal(&self, i: usize) -> (bool, bool) {
         let here = &self.list[i];
-        let turns = |there: Option<&Point>| there.is_some_and(|p| p.block != here.block);
-        (turns(i.checked_sub(1).and_then(|k| self.list.get(k))), turns(self.list.get(i + 1)))
+        let reverses = |there: Option<&Point>| there.is_some_and(|p| p.block != here.block);
+        (reverses(i.checked_sub(1).and_then(|k| self.list.get(k))), reverses(self.list.get(i + 1)))
     }
 }
 
@@ -268,8 +268,8 @@ fn average_stretches(
         let directions = &motion.direction;
         let (p, x, t) = (&recording.pressure, &recording.stroke, &recording.time);
         let n = recording.len().min(directions.len());
-        // What the muscle did before is not recorded: a beginning is as good as a turn, and may be one.
-        let mut turn = 0;
+        // What the muscle did before is not recorded: a beginning is as good as a reversal, and may be one.
+        let mut reversal = 0;
         let mut start = 0;
         let mut dropouts = screened.of_recording(index).peekable();
         while start < n {
@@ -297,8 +297,8 @@ fn average_stretches(
             }
             let count = (end - start) as f64;
             let [time, pressure, stroke, force] = sums.map(|s| s / count);
-            let since_turn =
-                (stroke - x[turn]).abs() * steps.per_stroke + (pressure - p[turn]).abs() * steps.per_pressure;
+            let since_reversal = (stroke - x[reversal]).abs() * steps.per_stroke
+                + (pressure - p[reversal]).abs() * steps.per_pressure;
             list.push(Point {
                 recording: index as u32,
                 first_row: start as u32,
@@ -310,12 +310,12 @@ fn average_stretches(
                 stroke,
                 force,
                 force_range: range,
-                since_turn,
+                since_reversal,
                 dropout,
             });
             if end < n && directions[end] != direction {
                 block += 1;
-                turn = end.saturating_sub(1);
+                reversal = end.saturating_sub(1);
             }
             start = end;
         }
@@ -325,7 +325,7 @@ fn average_stretches(
 }
 
 /// From the median size of second differences of the force, of at most some 40,000 rows spread evenly: trends drop out, and
-/// a few spikes or turns do not matter. For white noise the second difference has variance 6 σ².
+/// a few spikes or reversals do not matter. For white noise the second difference has variance 6 σ².
 fn row_noise(campaign: &Campaign, rows: usize) -> f64 {
     let stride = (rows / 40_000).max(1);
     let mut seconds: Vec<f64> = campaign
@@ -403,8 +403,8 @@ mod tests {
         let (campaign, motions) = loops(6000);
         let points = points(&Screened::of(&campaign), &motions);
         let first = points.list.iter().position(|p| p.direction < 0.0).expect("a way back");
-        assert!((points.list[first - 1].since_turn - 1.0).abs() < 0.01);
-        assert!(points.list[first].since_turn < 0.01);
-        assert!(points.list[first + 100].since_turn > 0.15);
+        assert!((points.list[first - 1].since_reversal - 1.0).abs() < 0.01);
+        assert!(points.list[first].since_reversal < 0.01);
+        assert!(points.list[first + 100].since_reversal > 0.15);
     }
 }

@@ -6,11 +6,11 @@ use super::screen::{PointUse, Screen};
 /// The screen with points excluded that are nearer to a reversal than `zone`, a share of the ranges of stroke and pressure.
 pub(super) fn with_zone(problem: &Problem, screen: &Screen, zone: f64) -> Screen {
     let used = problem.points.list.iter().zip(&screen.used).map(|(p, used)| match *used {
-        PointUse::Fitted if p.since_turn < zone => PointUse::NearReversal,
-        PointUse::NearReversal if p.since_turn >= zone => PointUse::Fitted,
+        PointUse::Fitted if p.since_reversal < zone => PointUse::NearReversal,
+        PointUse::NearReversal if p.since_reversal >= zone => PointUse::Fitted,
         other => other,
     });
-    Screen { turn_zone: zone, ..screen.with_use(used.collect()) }
+    Screen { reversal_zone: zone, ..screen.with_use(used.collect()) }
 }
 
 /// The distance from a reversal within which a solution lacks friction; zero where no friction is fitted.
@@ -32,13 +32,13 @@ pub(super) fn zone(problem: &Problem, screen: &Screen, parameters: &[f64]) -> f6
         let residual = p.direction * (p.force - e.force);
         // A friction below the noise does not show where it changes sign.
         (friction > 2.0 * noise && friction > 1e-3 * force)
-            .then(|| (p.since_turn, residual / friction, f64::from(p.rows) * friction * friction))
+            .then(|| (p.since_reversal, residual / friction, f64::from(p.rows) * friction * friction))
     });
     zone_of(shares)
 }
 
 /// The distance from a reversal at which friction has changed sign completely, as a share of the ranges (see
-/// [`super::points::Point::since_turn`]).
+/// [`super::points::Point::since_reversal`]).
 ///
 /// `missing` gives, per point after a reversal, its distance, the share of friction that its residual lacks (`s r / (k_F q)`), and a
 /// weight. Right after a reversal that share is near 2, far from it near 0. The zone ends where the mean stays below a tenth.

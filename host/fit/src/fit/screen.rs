@@ -56,7 +56,7 @@ pub struct Screen {
     /// The use of each point, in the order of the points.
     pub used: Vec<PointUse>,
     /// The distance from a reversal within which points are excluded, as a share of the ranges of stroke and pressure.
-    pub turn_zone: f64,
+    pub reversal_zone: f64,
     /// Whether the recordings show the muscle slack.
     pub goes_slack: bool,
     /// Readings outside the scatter of the others.
@@ -88,7 +88,7 @@ impl Screen {
                 PointUse::Fitted
             }
         });
-        Self { used: used.collect(), turn_zone: 0.05, goes_slack: false, outliers, held_down: Vec::new() }
+        Self { used: used.collect(), reversal_zone: 0.05, goes_slack: false, outliers, held_down: Vec::new() }
     }
 
     /// The same with another use of the points.

@@ -208,7 +208,7 @@ fn first(mut problem: Problem, screen: Screen, options: &Options) -> Stage {
         problem.design.hold_deadband = usual.powi(-2);
     }
     let start = problem.design.start(usual);
-    let screen = reversals::with_zone(&problem, &screen, screen.turn_zone);
+    let screen = reversals::with_zone(&problem, &screen, screen.reversal_zone);
     let (screen, parameters) = slack::find(&problem, &screen, start);
     let mut stage = Stage::weighed(problem, screen, &parameters, 12);
     // The zone after a reversal, from the friction that the residuals lack there; then once more with the better friction.
@@ -227,7 +227,7 @@ fn with_dimensions(stage: Stage, options: &Options) -> Stage {
     let Stage { problem, screen, weights, parameters } = stage;
     let (problem, parameters) = dimension_search::adjust(&problem, &screen, &weights, parameters, options);
     let (screen, parameters) = slack::find(&problem, &screen, parameters);
-    let screen = reversals::with_zone(&problem, &screen, screen.turn_zone);
+    let screen = reversals::with_zone(&problem, &screen, screen.reversal_zone);
     let weights = Weights::of(&problem, &screen, &parameters);
     let (problem, parameters) = dimension_search::adjust(&problem, &screen, &weights, parameters, options);
     Stage { problem, screen, weights, parameters }

@@ -52,7 +52,8 @@ pub struct Summary {
     /// Weight of the penalty on the curvature of `E_k(P)` and of `k_F(P)`, relative to the data.
     pub smoothing: [f64; 2],
     /// Distance from a reversal within which rows are excluded, as a share of the ranges of stroke and pressure.
-    pub turn_zone: f64,
+    #[serde(rename = "turn_zone")]
+    pub reversal_zone: f64,
     /// Condition number of the scaled elastic columns; absent where they are dependent.
     pub condition: Option<f64>,
     /// Correlations of the table's parameters at the middle pressure.
@@ -121,7 +122,8 @@ pub struct RowUse {
     /// Rows that took part.
     pub fitted: usize,
     /// Rows just after a reversal.
-    pub near_turn: usize,
+    #[serde(rename = "near_turn")]
+    pub near_reversal: usize,
     /// Rows whose direction of motion is unknown.
     pub unknown_direction: usize,
     /// Rows where the muscle is slack.
@@ -303,7 +305,7 @@ pub(super) fn summarise(
         models: vec![ModelError { name: "table".into(), mean_error_pct: all.mean, max_error_pct: all.max }],
         rows: row_use(solution),
         smoothing: [solution.smoothing.elastic, solution.smoothing.friction],
-        turn_zone: screen.turn_zone,
+        reversal_zone: screen.reversal_zone,
         condition: Some(problem.design.orthonormal.condition).filter(|c| c.is_finite()),
         correlations: Correlations::at(solution, &uncertain.root, median(&mut levels.to_vec())),
         not_determined: not_determined(solution, &uncertain.root),
@@ -352,7 +354,7 @@ fn row_use(solution: &Solution) -> RowUse {
     for (p, used) in solution.problem.points.list.iter().zip(&solution.screen.used) {
         *match used {
             PointUse::Fitted => &mut rows.fitted,
-            PointUse::NearReversal => &mut rows.near_turn,
+            PointUse::NearReversal => &mut rows.near_reversal,
             PointUse::UnknownDirection => &mut rows.unknown_direction,
             PointUse::Slack => &mut rows.slack,
             PointUse::Pushed => &mut rows.pushed,

@@ -114,7 +114,7 @@ fn of_muscle(member: usize, of: &Member<'_>) -> (Vec<Cell>, Vec<Mounted>) {
     for p in &points.list {
         let mounting = mounting_of[p.recording as usize];
         let moves = mountings[mounting].stroke.is_none();
-        let near = moves && p.since_turn < AFTER_REVERSAL;
+        let near = moves && p.since_reversal < AFTER_REVERSAL;
         if p.direction == 0.0 || p.dropout || near || clipped.is_some_and(|c| p.force <= c) {
             continue;
         }

@@ -29,8 +29,8 @@ pub(super) fn section(history: Option<&History>) -> Section {
     );
     section.table(parameters(h));
     section.figure(run_in(h));
-    if !h.courses.is_empty() {
-        section.figure(courses(h));
+    if !h.force_over_time.is_empty() {
+        section.figure(force_over_time(h));
     }
     section.figure(unseen(h));
     section.table(mountings(h));
@@ -87,10 +87,10 @@ fn run_in(h: &History) -> Figure {
 }
 
 /// Force over time since mounting at one pressure.
-fn courses(h: &History) -> Figure {
-    let pressure = h.courses.first().map_or(0.0, |c| c.pressure_kPa);
+fn force_over_time(h: &History) -> Figure {
+    let pressure = h.force_over_time.first().map_or(0.0, |c| c.pressure_kPa);
     let panels = h
-        .courses
+        .force_over_time
         .iter()
         .map(|c| {
             // The curve is the same on filling and emptying: only the memory moves it.

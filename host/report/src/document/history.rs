@@ -5,7 +5,8 @@
 
 use pam_diagnose::history::History;
 use pam_diagnose::history::answer::{
-    Course, ErrorSize, Estimate, Finding, FindingKind, LayerShare, MemoryLaw, Mounting, RunError, UnseenRuns,
+    ErrorSize, Estimate, Finding, FindingKind, ForceOverTime, LayerShare, MemoryLaw, Mounting, RunError,
+    UnseenRuns,
 };
 use serde::Serialize;
 
@@ -32,7 +33,7 @@ pub(super) struct HistoryDocument<'a> {
     findings: Vec<FindingDocument<'a>>,
     layers: Vec<LayerDocument>,
     /// For a picture.
-    courses: Vec<CourseDocument<'a>>,
+    courses: Vec<ForceOverTimeDocument<'a>>,
     /// Slope of the force over pressure at full length near the highest pressure.
     full_length_slope_N_per_kPa: Option<f64>,
 }
@@ -188,7 +189,7 @@ struct LayerDocument {
 /// Force over time since the mounting at one pressure.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-struct CourseDocument<'a> {
+struct ForceOverTimeDocument<'a> {
     /// Number of the mounting, from 1.
     mounting: usize,
     length_mm: f64,
@@ -215,7 +216,7 @@ impl<'a> HistoryDocument<'a> {
             runs: h.runs.iter().map(run).collect(),
             findings: h.findings.iter().map(finding).collect(),
             layers: h.layers.iter().map(layer).collect(),
-            courses: h.courses.iter().map(course).collect(),
+            courses: h.force_over_time.iter().map(force_over_time).collect(),
             full_length_slope_N_per_kPa: h.full_length_slope_N_per_kPa,
         }
     }
@@ -305,8 +306,8 @@ fn layer(l: &LayerShare) -> LayerDocument {
     LayerDocument { layer: wording::layer(l.layer), in_order: l.in_order, last_in: l.last_in }
 }
 
-fn course(c: &Course) -> CourseDocument<'_> {
-    CourseDocument {
+fn force_over_time(c: &ForceOverTime) -> ForceOverTimeDocument<'_> {
+    ForceOverTimeDocument {
         mounting: c.mounting,
         length_mm: c.length_mm,
         pressure_kPa: c.pressure_kPa,

@@ -253,7 +253,7 @@ mod tests {
             stroke,
             force: 1.0,
             force_range: (1.0, 1.0),
-            since_turn: 1.0,
+            since_reversal: 1.0,
             dropout: false,
         }
     }

@@ -319,7 +319,7 @@ fn one(text: &mut String, m: &Changed) {
     if !m.confusable_with.is_empty() {
         let _ = writeln!(text, "  alternatives {}", m.confusable_with.join(", "));
     }
-    let apart = separate::named(m);
+    let apart = separate::of_change(m);
     if !apart.is_empty() {
         let _ = writeln!(text, "  distinguish by {}", apart.join("; "));
     }
@@ -344,7 +344,7 @@ pub fn summary(r: &ChangeReport) -> String {
     for m in &r.missing {
         one(&mut text, m);
     }
-    if let Some((names, apart)) = separate::unnamed(r) {
+    if let Some((names, apart)) = separate::of_unnamed(r) {
         let _ = writeln!(text, "one of: {}; separate them by: {}", names.join(", "), apart.join("; "));
     }
     if r.shows_in_force() {

@@ -1,8 +1,8 @@
 //! Remarks on what can and cannot be concluded.
 
 use pam_data::pluralise::pluralise;
+use pam_diagnose::refit_comparison::RefitComparison;
 use pam_diagnose::remark::{Dimension, Refusal, Remark, RestFriction, Scatter, Unjudgeable};
-use pam_diagnose::reserve::Reserve;
 
 /// A remark as text without its full stop.
 #[must_use]
@@ -85,7 +85,7 @@ pub fn remark(remark: &Remark) -> String {
         Remark::Dimensions(all) => dimensions(all),
         Remark::Refused { effect, why } => refused(effect, why),
         Remark::Measured { check, value } => format!("measured with {check}: {value}"),
-        Remark::Table { file, reserve: r } => format!("{file}: {}", reserve(r)),
+        Remark::Table { file, comparison: c } => format!("{file}: {}", refit_comparison(c)),
     }
 }
 
@@ -221,7 +221,7 @@ fn refused(effect: &str, why: &Refusal) -> String {
 
 /// What happened to the effects when the table was refitted.
 #[must_use]
-fn reserve(r: &Reserve) -> String {
+fn refit_comparison(r: &RefitComparison) -> String {
     let left_out = r.left_out.map_or(String::new(), |(plain, with)| {
         format!("; a pressure left out of the fit: {with:.2} % of blocked force against {plain:.2} %")
     });

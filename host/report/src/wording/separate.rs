@@ -24,7 +24,7 @@ fn shows<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'static str> {
 
 /// What to record or to measure to separate a named change from those that may be meant instead; nothing without such.
 #[must_use]
-pub(crate) fn named(m: &Changed) -> Vec<&'static str> {
+pub(crate) fn of_change(m: &Changed) -> Vec<&'static str> {
     if m.confusable_with.is_empty() {
         return Vec::new();
     }
@@ -33,7 +33,7 @@ pub(crate) fn named(m: &Changed) -> Vec<&'static str> {
 
 /// The names that are possible where none is given, with what separates them; nothing where they are improbable even together.
 #[must_use]
-pub(crate) fn unnamed(r: &ChangeReport) -> Option<(Vec<&str>, Vec<&'static str>)> {
+pub(crate) fn of_unnamed(r: &ChangeReport) -> Option<(Vec<&str>, Vec<&'static str>)> {
     let possible = || r.probabilities.iter().filter(|p| Change::from_name(&p.cause).is_some());
     let together: f64 = possible().map(|p| p.probability).sum();
     let withdrawn = possible().any(|p| p.probability >= 0.5);

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use pam_data::date::{DateSource, day};
 use pam_diagnose::reference::ChangeReport;
-use pam_diagnose::timeline::course::{Change, Course, How};
+use pam_diagnose::timeline::change_points::{Change, ChangePoints, How};
 use pam_diagnose::timeline::series::{Point, Quantity, Series, What};
 use pam_diagnose::timeline::{Timeline, Visit};
 
@@ -234,14 +234,19 @@ pub fn summary(visits: &[Visit], found: &Timeline) -> String {
     } else {
         "\nQuantities (without intervals, as no campaign repeats a recording):\n"
     });
-    for (series, course) in &found.series {
+    for (series, change_points) in &found.series {
         let ends: Vec<String> = [series.points.first(), series.points.last()]
             .into_iter()
             .flatten()
             .map(|p| p.as_ref().map_or_else(|| "–".to_owned(), |p| point(p, &series.unit)))
             .collect();
-        let _ =
-            writeln!(text, "  {:26} {}  ({})", name(&series.what), ends.join(" → "), judged(series, course));
+        let _ = writeln!(
+            text,
+            "  {:26} {}  ({})",
+            name(&series.what),
+            ends.join(" → "),
+            judged(series, change_points)
+        );
     }
     for warning in warnings(visits, found) {
         let _ = writeln!(text, "note: {warning}");
@@ -259,14 +264,14 @@ fn beyond_repeats(series: &Series) -> bool {
 
 /// The text on the trend of a quantity.
 #[must_use]
-pub(crate) fn judged(series: &Series, course: &Course) -> String {
-    match (course.too_few, course.changes.len()) {
+pub(crate) fn judged(series: &Series, change_points: &ChangePoints) -> String {
+    match (change_points.too_few, change_points.changes.len()) {
         (true, _) => "too few campaigns to judge".to_owned(),
         (_, 0) if beyond_repeats(series) => format!(
             "no change named, probability of none {:.2}; values differ by more than their repeats: record more campaigns",
-            course.none
+            change_points.none
         ),
-        (_, 0) => format!("no change named, probability of none {:.2}", course.none),
+        (_, 0) => format!("no change named, probability of none {:.2}", change_points.none),
         (_, 1) => "one change".to_owned(),
         (_, n) => format!("{n} changes"),
     }

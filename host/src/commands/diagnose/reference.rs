@@ -200,8 +200,8 @@ pub fn run(arguments: &Arguments, console: &Console, taken: bool) -> Result<()> 
     let from = muscle.iter().fold(reports::of_files(&files), |from, muscle| from.muscle(muscle));
     arguments.reports.write(console, &from, || change_page::page(&report, &after))?;
     if arguments.json.as_deref() != Some(Path::new("-")) {
-        let words = wording::summary(&report);
-        if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+        let text = wording::summary(&report);
+        if taken { console.note(text.trim_end()) } else { console.result(text.trim_end()) }
     }
     // Last, so that the answer is there where no table can be written.
     if let (Some(output), Some(muscle)) = (&arguments.output, &muscle) {

@@ -209,8 +209,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console, taken: bool) -> Resu
     }
     arguments.reports.write(console, &from, || stock_page::page(&answer))?;
     if arguments.json.as_deref().map(Path::as_os_str) != Some(OsStr::new("-")) {
-        let words = stock_text::text(&answer);
-        if taken { console.note(words.trim_end()) } else { console.result(words.trim_end()) }
+        let text = stock_text::text(&answer);
+        if taken { console.note(text.trim_end()) } else { console.result(text.trim_end()) }
     }
     Ok(())
 }
@@ -219,14 +219,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console, taken: bool) -> Resu
 mod tests {
     use super::*;
 
-    fn parsed(words: &str) -> Arguments {
-        Arguments::of(words.split(' ').map(Into::into).collect()).expect("a valid call")
+    fn parsed(line: &str) -> Arguments {
+        Arguments::of(line.split(' ').map(Into::into).collect()).expect("a valid call")
     }
 
     type Grouped = Vec<(String, Option<String>, usize)>;
 
-    fn groups(words: &str) -> Result<Grouped> {
-        let arguments = parsed(words);
+    fn groups(line: &str) -> Result<Grouped> {
+        let arguments = parsed(line);
         let groups = arguments.muscles.groups(&arguments.recordings.files)?;
         let text = |path: &Path| path.display().to_string();
         Ok(groups.into_iter().map(|g| (text(g.muscle), g.import.map(text), g.files.len())).collect())

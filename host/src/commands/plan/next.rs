@@ -7,7 +7,7 @@ use super::Arguments;
 use crate::console::Console;
 use crate::documents::{bench, text};
 use pam_campaign::analysis::names;
-use pam_campaign::engine::{Engine, Plan, Planned};
+use pam_campaign::engine::{Engine, Plan, PlannedStep};
 use pam_campaign::instructions::{instructions, protocol};
 use pam_campaign::rig::Rig;
 use pam_data::error::{DataCode, Error, Result};
@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 }
 
 /// The name of a step's file, without extension.
-fn file_name(number: usize, planned: &Planned) -> String {
+fn file_name(number: usize, planned: &PlannedStep) -> String {
     format!("{number:02}_{}", planned.step.name())
 }
 

@@ -19,7 +19,7 @@ pub(super) fn run(table: &Path, file: &Path, json: Option<&Path>, console: &Cons
     let protocol = protocol_simulation::read(file)?;
     let rows = isolability(&protocol, &muscle).map_err(|e| e.file(file))?;
     if let Some(path) = json {
-        let effects = rows.iter().map(bench::Planned::of).collect();
+        let effects = rows.iter().map(bench::EffectVisibility::of).collect();
         let json = text(&bench::Plan { schema: "pam-plan/1", effects })?;
         write_whole(path, (json + "\n").as_bytes())?;
     }

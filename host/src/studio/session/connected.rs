@@ -84,8 +84,8 @@ impl Connected {
         let emulated = Emulated::start(stand, None, 1.0)?;
         let address = emulated.address().clone();
         let client = Client::open(&address)?;
-        let words = emulated.description();
-        Ok((Self::new(address, client, Some((emulated, mishap)))?, words))
+        let description = emulated.description();
+        Ok((Self::new(address, client, Some((emulated, mishap)))?, description))
     }
 
     /// Where it is connected.
@@ -296,8 +296,8 @@ impl Connected {
                         .help("arm it first"));
                 }
                 let reachable = Reachability::of(&mut self.client)?;
-                if let Some(words) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
-                    return Err(Error::new(DataCode::CallInvalid, words).help("request less"));
+                if let Some(reason) = reachable.and_then(|r| r.beyond(quantity, &profile)) {
+                    return Err(Error::new(DataCode::CallInvalid, reason).help("request less"));
                 }
                 if self.status.state == State::Running && !self.client.controls() {
                     return Err(messages::in_use("start"));

@@ -19,7 +19,7 @@ fn row(case: &Case, out: &mut String) -> bool {
         out,
         "| {}: {} | {} | {} | {:.3} → {:.3} | {:.2} | {:.2} | {:.2} |",
         case.effect,
-        case.words,
+        case.description,
         case.plain.name,
         if named.is_empty() { "nothing".into() } else { named.join(", ") },
         tables.rms.0,
@@ -35,7 +35,7 @@ fn page() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/closed-loop.md")
 }
 
-/// Beginning of the page, and the head of its table.
+/// Beginning of the page, and the header of its table.
 const INTRODUCTION: &str = "# Diagnosis in closed loop\n\n\
     Written by `cargo run --release -p emulator-tests --bin diagnosed`; nothing here is typed by hand.\n\n\
     In each row a muscle of the virtual bench has a concealed effect. It is recorded by protocol D, fitted without effects (plain \

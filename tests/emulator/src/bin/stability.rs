@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use emulator_tests::misjudged::{self, Corner};
-use emulator_tests::sweep::{Course, Law, Load, Still, Subject};
+use emulator_tests::sweep::{Law, Load, Profile, Still, Subject};
 use model_core::link::messages::Mode;
 use virtual_bench::presets;
 
@@ -15,7 +15,7 @@ const OFF: f32 = 0.2;
 fn row(text: &mut String, subject: &Subject, corner: &Corner) {
     let other = corner.subject(subject);
     let errors = [Load::Moved, Load::Spring]
-        .map(|load| other.error(Mode::Force, load, Course::Sine(1.0), Law::Trimmed))
+        .map(|load| other.error(Mode::Force, load, Profile::Sine(1.0), Law::Trimmed))
         .map(|error| format!("{error:.2}"));
     let Still { error, swing, jump } = other.still(Load::AtStroke, Law::Trimmed);
     let _ = writeln!(

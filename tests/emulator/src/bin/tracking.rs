@@ -5,50 +5,50 @@ use std::io;
 use std::path::Path;
 
 use emulator_tests::bandwidth::Bandwidth;
-use emulator_tests::sweep::{COURSES, Course, LAWS, Law, Load, Still, Subject, in_qemu};
+use emulator_tests::sweep::{LAWS, Law, Load, PROFILES, Profile, Still, Subject, in_qemu};
 use model_core::link::messages::Mode;
 use pam_report::{Axis, Colour, Figure, Panel};
 use virtual_bench::presets;
 
-const HEAD: &str = "| load | setpoint | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\
+const TABLE_HEADER: &str = "| load | setpoint | table | table + trim | Gaylord | PI alone | regulator's limit | PI : table + trim |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
 /// A setpoint, and the error of each law and the regulator's limit.
-type Row = (Course, [f64; 5]);
+type Row = (Profile, [f64; 5]);
 
 fn rows(text: &mut String, subject: &Subject, mode: Mode, load: Load) -> Vec<Row> {
     let mut rows = Vec::new();
-    for course in COURSES {
-        let errors = LAWS.map(|law| subject.error(mode, load, course, law));
-        let limit = subject.limit(mode, load, course);
+    for profile in PROFILES {
+        let errors = LAWS.map(|law| subject.error(mode, load, profile, law));
+        let limit = subject.limit(mode, load, profile);
         let [table, trimmed, gaylord, feedback] = errors;
         let _ = writeln!(
             text,
             "| {} | {} | {table:.2} | {trimmed:.2} | {gaylord:.2} | {feedback:.2} | {limit:.2} | {:.1} |",
             load.name(),
-            course.name(),
+            profile.name(),
             feedback / trimmed
         );
-        rows.push((course, [table, trimmed, gaylord, feedback, limit]));
+        rows.push((profile, [table, trimmed, gaylord, feedback, limit]));
     }
     rows
 }
 
 /// The largest errors of the table and of table and trim where the regulator can follow, and how many times as large that of PI alone is at 1 Hz.
 fn compared_with_target(rows: &[Row]) -> [f64; 4] {
-    let can_follow = |course: Course| match course {
-        Course::Steps => false,
-        Course::Ramps => true,
-        Course::Sine(hz) => hz <= 2.0,
+    let can_follow = |profile: Profile| match profile {
+        Profile::Steps => false,
+        Profile::Ramps => true,
+        Profile::Sine(hz) => hz <= 2.0,
     };
     let largest = |law: usize| {
         rows.iter()
-            .filter(|(course, _)| can_follow(*course))
+            .filter(|(profile, _)| can_follow(*profile))
             .map(|(_, errors)| errors[law])
             .fold(0.0, f64::max)
     };
     let ratio = |law: usize| {
-        let at = rows.iter().find(|(course, _)| *course == Course::Sine(1.0));
+        let at = rows.iter().find(|(profile, _)| *profile == Profile::Sine(1.0));
         at.map_or(f64::NAN, |(_, errors)| errors[3] / errors[law])
     };
     [largest(0), largest(1), ratio(0), ratio(1)]
@@ -57,9 +57,9 @@ fn compared_with_target(rows: &[Row]) -> [f64; 4] {
 fn panel(name: &str, rows: &[Row]) -> Panel {
     let sines: Vec<(f32, [f64; 5])> = rows
         .iter()
-        .filter_map(|(course, errors)| match course {
-            Course::Sine(hz) => Some((*hz, *errors)),
-            Course::Steps | Course::Ramps => None,
+        .filter_map(|(profile, errors)| match profile {
+            Profile::Sine(hz) => Some((*hz, *errors)),
+            Profile::Steps | Profile::Ramps => None,
         })
         .collect();
     let names = ["fitted table", "table and trim", "ideal braid (Gaylord)", "PI alone", "regulator's limit"];
@@ -88,7 +88,7 @@ fn main() -> io::Result<()> {
     let mut targets = String::new();
     let subjects = [presets::miniature(), presets::contractile(), presets::push()].map(Subject::of);
     for subject in &subjects {
-        let _ = write!(text, "\n## {}: force\n\n{HEAD}", subject.spec.name);
+        let _ = write!(text, "\n## {}: force\n\n{TABLE_HEADER}", subject.spec.name);
         for load in [Load::AtStroke, Load::Moved, Load::Spring] {
             let rows = rows(&mut text, subject, Mode::Force, load);
             let [table, trimmed, times, times_trimmed] = compared_with_target(&rows);
@@ -102,7 +102,7 @@ fn main() -> io::Result<()> {
                 panels.push(panel(&format!("{}, moved at 0.3 Hz", subject.spec.name), &rows));
             }
         }
-        let _ = write!(text, "\n## {}: stroke\n\n{HEAD}", subject.spec.name);
+        let _ = write!(text, "\n## {}: stroke\n\n{TABLE_HEADER}", subject.spec.name);
         rows(&mut text, subject, Mode::Stroke, Load::Spring);
     }
     let _ = write!(
@@ -135,7 +135,7 @@ fn main() -> io::Result<()> {
         for factor in [0.8, 1.0, 1.2] {
             let other = subject.misjudged(factor);
             let [table, trimmed] = [Law::Table, Law::Trimmed]
-                .map(|law| other.error(Mode::Force, Load::Moved, Course::Sine(1.0), law));
+                .map(|law| other.error(Mode::Force, Load::Moved, Profile::Sine(1.0), law));
             let _ = writeln!(text, "| {} | {factor} | {table:.2} | {trimmed:.2} |", subject.spec.name);
         }
     }
@@ -188,16 +188,16 @@ fn main() -> io::Result<()> {
     let mut emulated = String::new();
     for subject in &subjects {
         for (mode, load) in [(Mode::Force, Load::Moved), (Mode::Stroke, Load::Spring)] {
-            for course in [Course::Steps, Course::Ramps, Course::Sine(1.0)] {
-                let here = subject.error(mode, load, course, Law::Trimmed);
-                let Ok(there) = in_qemu(subject, mode, load, course, Law::Trimmed) else { continue };
+            for profile in [Profile::Steps, Profile::Ramps, Profile::Sine(1.0)] {
+                let here = subject.error(mode, load, profile, Law::Trimmed);
+                let Ok(there) = in_qemu(subject, mode, load, profile, Law::Trimmed) else { continue };
                 let what = if mode == Mode::Stroke { "stroke" } else { "force" };
                 let _ = writeln!(
                     emulated,
                     "| {} | {what} | {} | {} | {here:.2} | {there:.2} |",
                     subject.spec.name,
                     load.name(),
-                    course.name()
+                    profile.name()
                 );
             }
         }

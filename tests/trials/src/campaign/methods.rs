@@ -174,14 +174,14 @@ fn chosen(made: &Made, bench_s: f64, folder: Scratch) -> Result<Recorded, String
     let muscle = MuscleDescription::parse(&made.description).map_err(message)?;
     let mut engine = Engine::new(muscle, rig(), Purpose::Both, bench_s).map_err(message)?;
     let mut bench = VirtualBench::new(&made.truth.bench);
-    let course = simulate(&mut engine, &mut bench, Some(&folder.0)).map_err(message)?;
-    let checks = course.iter().filter(|d| matches!(d.chosen.step, Step::Check { .. }));
+    let steps = simulate(&mut engine, &mut bench, Some(&folder.0)).map_err(message)?;
+    let checks = steps.iter().filter(|d| matches!(d.chosen.step, Step::Check { .. }));
     Ok(Recorded {
         recordings: engine.recordings().to_vec(),
         checks: checks.map(|d| folder.0.join(&d.file)).collect(),
         bench_s: bench.clock(),
-        choosing_s: course.iter().map(|d| d.chosen.choosing_s).fold(0.0, f64::max),
-        ended: course.last().map_or(String::new(), |d| d.chosen.why.clone()),
+        choosing_s: steps.iter().map(|d| d.chosen.choosing_s).fold(0.0, f64::max),
+        ended: steps.last().map_or(String::new(), |d| d.chosen.why.clone()),
         _folder: folder,
     })
 }
@@ -226,7 +226,7 @@ fn random(spec: &Spec, made: &Made, bench_s: f64, folder: Scratch) -> Result<Rec
             }
             Ok(true)
         };
-        bench.perform(&step.course(&places), &mut take).map_err(message)?;
+        bench.perform(&step.profile(&places), &mut take).map_err(message)?;
         let recorded = recording(&step.name(), &rows);
         match step {
             Step::BlockedRamp => places.learn_ramp(&recorded),

@@ -12,7 +12,7 @@ const INTRODUCTION: &str = "# Trials of automatic campaigns\n\nThis command wrot
 const DIAGNOSIS: &str = "## Diagnosis\n\n\"Only the right name\": at least one effect is named, every name is without competitors, and every \
     name is a hidden effect; of two hidden effects one may be missing.\n\n";
 
-/// The head of its table; the third column counts resolved campaigns.
+/// The header of its table; the third column counts resolved campaigns.
 const COLUMNS: &str = "| method | muscles | only the right name | class right | truth in the set, where a name is given | nothing named | false alarms |\n\
     | --- | --- | --- | --- | --- | --- | --- |\n";
 

@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use clap::Args;
 use pam_data::statistics::quantile;
 
-use super::course::{self, Course};
 use super::injection::Slopes;
 use super::staircases::{self, Half, Muscle};
+use super::time_course::{self, TimeCourse};
 use super::together;
 use crate::rate::Rate;
 
@@ -88,7 +88,7 @@ fn two(t: &mut String, trials: &[together::Trial]) {
     }
 }
 
-fn when(t: &mut String, trials: &[course::Trial]) {
+fn when(t: &mut String, trials: &[time_course::Trial]) {
     let _ = writeln!(
         t,
         "\n## Since when\n\nIn each muscle, one of eight changes begins within the later half of the runs, at a moment drawn by hash from the middle \
@@ -97,23 +97,24 @@ fn when(t: &mut String, trials: &[course::Trial]) {
          | change | n | class right | course right | course wrong | right recording | error, median | error, 90 % | moment in the stated 95 % |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     );
-    for course in [Course::Whole, Course::Step, Course::Ramp] {
-        for percent in course::SIZES {
-            let own: Vec<&course::Trial> =
-                trials.iter().filter(|c| c.course == course && c.percent == percent).collect();
-            let (name, right) = match course {
-                Course::Whole => ("from the beginning", "beginning"),
-                Course::Step => ("suddenly", "suddenly"),
-                Course::Ramp => ("gradually", "gradually"),
+    for time_course in [TimeCourse::Whole, TimeCourse::Step, TimeCourse::Ramp] {
+        for percent in time_course::SIZES {
+            let own: Vec<&time_course::Trial> =
+                trials.iter().filter(|c| c.time_course == time_course && c.percent == percent).collect();
+            let (name, right) = match time_course {
+                TimeCourse::Whole => ("from the beginning", "beginning"),
+                TimeCourse::Step => ("suddenly", "suddenly"),
+                TimeCourse::Ramp => ("gradually", "gradually"),
             };
-            let named: Vec<&course::Trial> = own.iter().copied().filter(|c| c.right).collect();
-            let answer: Vec<&course::Trial> = named.iter().copied().filter(|c| c.answer == right).collect();
-            let error = |c: &&course::Trial| c.found.map(|f| (f[0] - c.start).abs());
+            let named: Vec<&time_course::Trial> = own.iter().copied().filter(|c| c.right).collect();
+            let answer: Vec<&time_course::Trial> =
+                named.iter().copied().filter(|c| c.answer == right).collect();
+            let error = |c: &&time_course::Trial| c.found.map(|f| (f[0] - c.start).abs());
             let mut errors: Vec<f64> = answer.iter().filter_map(error).collect();
             let inside = rate(&answer, |c| c.found.is_some_and(|f| f[1] <= c.start && c.start <= f[2]));
             let wrong = rate(&named, |c| c.answer != right && c.answer != "not determined");
-            let (recording, inside) = match course {
-                Course::Whole => ("–".into(), "–".into()),
+            let (recording, inside) = match time_course {
+                TimeCourse::Whole => ("–".into(), "–".into()),
                 _ => (rate(&answer, |c| c.recording).to_string(), inside.to_string()),
             };
             let mut error = |share: f64| match errors.as_mut_slice() {
@@ -158,7 +159,7 @@ pub fn run(what: &Further) -> Result<(), Box<dyn Error>> {
         muscles.iter().filter(own).map(|m| (m, Slopes::of(&m.between(1, m.runs)))).collect();
     let jobs: Vec<(&Muscle, &Slopes)> = slopes.iter().map(|(m, s)| (*m, s)).collect();
     let pairs = together::run(&jobs)?;
-    let courses = course::run(&jobs)?;
+    let time_courses = time_course::run(&jobs)?;
     let half = what.half.as_deref().map_or_else(String::new, |h| format!(" --half {h}"));
     let mut text = format!(
         "# Two changes, and since when\n\n`host diagnose AFTER… --reference BEFORE…` is tested on real recordings of {} fluidic muscles (pressure staircases \
@@ -169,8 +170,11 @@ pub fn run(what: &Further) -> Result<(), Box<dyn Error>> {
     );
     text += DEVELOPED;
     two(&mut text, &pairs);
-    when(&mut text, &courses);
-    std::fs::write(what.output.join("further.json"), serde_json::to_string_pretty(&(&pairs, &courses))?)?;
+    when(&mut text, &time_courses);
+    std::fs::write(
+        what.output.join("further.json"),
+        serde_json::to_string_pretty(&(&pairs, &time_courses))?,
+    )?;
     std::fs::write(what.output.join("further.md"), &text)?;
     print!("{text}");
     if let Some(page) = &what.page {

@@ -16,7 +16,9 @@ use crate::binomial_interval::interval;
 
 mod texts;
 
-use texts::{BOUNDS, COMPARISON, CYLINDER, HEAD, INJECTED, INTRODUCTION, TABLES, UNCHANGED, UNTESTED};
+use texts::{
+    BOUNDS, COMPARISON, CYLINDER, INJECTED, INTRODUCTION, TABLE_HEADER, TABLES, UNCHANGED, UNTESTED,
+};
 
 /// Rows of either side in the measurement of speed.
 const SPEED_ROWS: usize = 30_000;
@@ -117,7 +119,7 @@ fn injected(text: &mut String, trials: &[Trial]) {
             Half::Final => "Muscles that were not used to choose constants",
             Half::Development => "Muscles that were used to choose constants",
         };
-        let _ = write!(text, "\n### {title}\n\n{HEAD}");
+        let _ = write!(text, "\n### {title}\n\n{TABLE_HEADER}");
         for year in ["2021", "2022"] {
             for percent in [1.0, 2.0, 3.0, 5.0] {
                 let some: Vec<&Trial> = trials
@@ -133,7 +135,7 @@ fn injected(text: &mut String, trials: &[Trial]) {
             }
         }
     }
-    let _ = write!(text, "\n### By effect, final half, 3 %\n\n{HEAD}");
+    let _ = write!(text, "\n### By effect, final half, 3 %\n\n{TABLE_HEADER}");
     for effect in EFFECTS {
         let own = |t: &&Trial| t.effect == Some(effect) && t.half == Half::Final && t.percent == 3.0;
         line(text, effect, &trials.iter().filter(own).collect::<Vec<_>>());
@@ -250,12 +252,12 @@ pub fn tables(trials: &[Trial]) -> String {
     if trials.is_empty() {
         return text;
     }
-    let _ = write!(text, "\n{TABLES}{HEAD}");
+    let _ = write!(text, "\n{TABLES}{TABLE_HEADER}");
     for percent in [3.0, 5.0, 10.0] {
         let own: Vec<&Trial> = trials.iter().filter(|t| t.effect.is_some() && t.percent == percent).collect();
         line(&mut text, &format!("{percent} %"), &own);
     }
-    let _ = write!(text, "\n### By effect, 5 and 10 %\n\n{HEAD}");
+    let _ = write!(text, "\n### By effect, 5 and 10 %\n\n{TABLE_HEADER}");
     for effect in EFFECTS {
         let own = |t: &&Trial| t.effect == Some(effect) && t.percent >= 5.0;
         line(&mut text, effect, &trials.iter().filter(own).collect::<Vec<_>>());

@@ -59,7 +59,7 @@ fn lines_of_rows<'a>(
     }
     let find = |row: usize| {
         let wanted: Vec<&str> =
-            columns.iter().map(|(_, words)| words.map_or(file.as_str(), |w| w.get(row))).collect();
+            columns.iter().map(|(_, texts)| texts.map_or(file.as_str(), |w| w.get(row))).collect();
         let fits = |line: &&Vec<String>| {
             columns
                 .iter()

@@ -69,7 +69,7 @@ pub(super) fn find<'a>(
         let first = column.first_text.as_deref().unwrap_or_default();
         if first.matches('/').count() == 2 {
             dates(column, first, &cells(n), forms, &mut found);
-        } else if column.named_for().is_some() {
+        } else if column.quantity_by_name().is_some() {
             separators(column, first, &cells(n), forms, &mut found);
         }
     }
@@ -99,7 +99,7 @@ fn separators(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Fo
          thousands, or describe the column and write thousands = \"{sign}\"",
         column.header
     );
-    found.unknown.push(Note::on_column(&column.header, column.named_for(), text));
+    found.unknown.push(Note::on_column(&column.header, column.quantity_by_name(), text));
 }
 
 /// The order of the dates of a column.
@@ -125,7 +125,7 @@ fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, 
                  unit = \"timestamp-month-first\" or \"timestamp-day-first\"",
                 column.header
             );
-            found.unknown.push(Note::on_column(&column.header, column.named_for(), text));
+            found.unknown.push(Note::on_column(&column.header, column.quantity_by_name(), text));
             return;
         }
         (None, None) => return,

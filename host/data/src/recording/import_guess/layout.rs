@@ -66,37 +66,37 @@ impl Layout {
     /// Looks for the names, and for units below them, above the first row.
     fn find_names(&mut self, rows: &[Option<Vec<String>>], dialect: Dialect, lines: &[&[u8]]) {
         let width = self.names.len();
-        let words = |row: &[String]| {
+        let is_text = |row: &[String]| {
             row.iter().filter(|c| !c.is_empty()).all(|c| !number_of(c, dialect.decimal_comma))
         };
-        let named = |row: &[String]| row.len() == width && words(row);
+        let is_names_row = |row: &[String]| row.len() == width && is_text(row);
         let mut above =
             rows[..self.data_at].iter().enumerate().rev().filter_map(|(n, r)| Some((n, r.as_ref()?)));
         match above.next() {
-            Some((at, row)) if named(row) => {
+            Some((at, row)) if is_names_row(row) => {
                 (self.names_at, self.names) = (Some(at), row.clone());
                 if are_units(row)
-                    && let Some((at, names)) = above.next().filter(|(_, names)| named(names))
+                    && let Some((at, names)) = above.next().filter(|(_, names)| is_names_row(names))
                 {
                     self.units = Some(row.clone());
                     (self.names_at, self.names) = (Some(at), names.clone());
                 } else if !are_units(row)
                     && let Some((_, units)) =
-                        above.next().filter(|(_, units)| named(units) && are_units(units))
+                        above.next().filter(|(_, units)| is_names_row(units) && are_units(units))
                 {
                     self.units = Some(units.clone());
                 }
             }
             // Loggers write names for a column of remarks that most rows lack, or end every row with a delimiter.
-            Some((_, row)) if words(row) && row.len() == width + 1 => self.names = row[..width].to_vec(),
-            Some((_, row)) if words(row) && row.len() + 1 == width && ends_empty(rows, width) => {
+            Some((_, row)) if is_text(row) && row.len() == width + 1 => self.names = row[..width].to_vec(),
+            Some((_, row)) if is_text(row) && row.len() + 1 == width && ends_empty(rows, width) => {
                 self.names[..width - 1].clone_from_slice(row);
             }
             _ => {
                 let remark = lines[..self.data_at].iter().rev().find(|l| is_remark(l, Some(b'#')));
                 let row =
                     remark.and_then(|remark| cells(remark.trim_ascii_start()[1..].trim_ascii(), dialect));
-                if let Some(row) = row.filter(|row| named(row)) {
+                if let Some(row) = row.filter(|row| is_names_row(row)) {
                     self.names = row;
                 }
             }
@@ -298,8 +298,8 @@ mod tests {
         );
         let remarks = of(&format!("time_s,force_N,remark\n{}", rows("0.5,7")));
         assert_eq!((remarks.names, remarks.names_at), (vec!["time_s".to_owned(), "force_N".into()], None));
-        let head = "LabVIEW Measurement\t\nY_Unit_Label\tkPa\tN\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n";
-        let labview = of(&format!("{head}X_Value\tP1\tLoad\tComment\n{}", rows("0.5\t7\t3")));
+        let header = "LabVIEW Measurement\t\nY_Unit_Label\tkPa\tN\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n";
+        let labview = of(&format!("{header}X_Value\tP1\tLoad\tComment\n{}", rows("0.5\t7\t3")));
         assert_eq!(
             (labview.names, labview.names_at),
             (vec!["Time".to_owned(), "P1".into(), "Load".into()], None)

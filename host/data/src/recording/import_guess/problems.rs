@@ -10,7 +10,7 @@ use crate::recording::Quantity;
 /// Columns that are named for a quantity and hold cells that are not numbers.
 pub(super) fn texts(sample: &Sample, guess: &mut Guess) {
     for column in &sample.columns {
-        let Some(quantity) = column.named_for() else { continue };
+        let Some(quantity) = column.quantity_by_name() else { continue };
         let is_known = guess.unknown.iter().any(|note| note.is_on_column(&column.header));
         let coded = matches!(quantity, Quantity::Direction | Quantity::Cycle);
         if column.texts == 0 || coded || is_known || guess.has(quantity) {

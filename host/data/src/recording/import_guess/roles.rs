@@ -7,8 +7,8 @@ use super::names::{Family, Name, Score};
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
 use super::{
-    Guess, GuessedColumn, Note, Source, absolute, named_length, named_pressure, problems, runs, side_by_side,
-    stroke, time, values,
+    Guess, GuessedColumn, Note, Source, absolute, constant_pressure, file_name_length, problems, runs,
+    side_by_side, stroke, time, values,
 };
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
@@ -60,9 +60,9 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     }
     time::find(sample, &mut used, &mut guess);
     problems::texts(sample, &mut guess);
-    named_pressure::find(sample, others, &mut guess);
+    constant_pressure::find(sample, others, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
-    named_length::find(others, &mut guess);
+    file_name_length::find(others, &mut guess);
     stroke::judge(sample, others, &mut guess);
     absolute::ask(sample, &mut guess);
     let several = side_by_side::find(sample, &mut used, &mut guess);

@@ -79,7 +79,7 @@ impl Levels {
 }
 
 impl SampleColumn {
-    fn named(header: &str, name: Name) -> Self {
+    fn with_name(header: &str, name: Name) -> Self {
         Self { header: header.to_owned(), name, levels: Some(Levels::default()), ..Self::default() }
     }
 
@@ -103,7 +103,7 @@ impl SampleColumn {
     }
 
     /// The quantity that its name says.
-    pub(super) fn named_for(&self) -> Option<Quantity> {
+    pub(super) fn quantity_by_name(&self) -> Option<Quantity> {
         self.name.quantity().map(|(quantity, _)| quantity)
     }
 
@@ -237,14 +237,14 @@ impl Sample {
 
     /// The cells of the first rows. The lines above the table may stand among them again.
     fn rows_of(&mut self, lines: &[&[u8]], layout: &Layout) -> Vec<Vec<String>> {
-        let words = |line: &&[u8]| line.iter().any(u8::is_ascii_alphabetic);
-        let head: Vec<&[u8]> =
-            lines[..layout.data_at].iter().map(|l| l.trim_ascii_end()).filter(words).collect();
+        let has_letters = |line: &&[u8]| line.iter().any(u8::is_ascii_alphabetic);
+        let lines_above: Vec<&[u8]> =
+            lines[..layout.data_at].iter().map(|l| l.trim_ascii_end()).filter(has_letters).collect();
         let mut rows = Vec::new();
-        let mut again = Vec::new();
+        let mut repeated = Vec::new();
         for (number, line) in (layout.data_at + 1..).zip(&lines[layout.data_at..]) {
-            if head.contains(&line.trim_ascii_end()) {
-                again.push(number);
+            if lines_above.contains(&line.trim_ascii_end()) {
+                repeated.push(number);
                 continue;
             }
             let Some(row) = cells(line, layout.dialect()) else { continue };
@@ -266,7 +266,7 @@ impl Sample {
                 break;
             }
         }
-        if let Some(first) = again.first() {
+        if let Some(first) = repeated.first() {
             self.notes.push(format!(
                 "lines above the table are repeated among the rows, first in line {first}, and are left out"
             ).into());
@@ -291,7 +291,7 @@ impl Sample {
     fn of_columns(table: &[(String, Stored)]) -> Self {
         let mut sample = Self { has_header: true, whole: true, ..Self::default() };
         for (header, stored) in table {
-            let mut column = SampleColumn::named(header, Name::of(header));
+            let mut column = SampleColumn::with_name(header, Name::of(header));
             match stored {
                 Stored::Numbers(numbers) => {
                     sample.whole &= numbers.len() <= ROWS;
@@ -313,8 +313,8 @@ impl Sample {
 
 fn columns_of(layout: &Layout) -> Vec<SampleColumn> {
     let name = |(k, header): (usize, &String)| match layout.units.as_ref().and_then(|u| u.get(k)) {
-        Some(unit) => SampleColumn::named(header, Name::with_unit_below(header, unit)),
-        None => SampleColumn::named(header, Name::of(header)),
+        Some(unit) => SampleColumn::with_name(header, Name::with_unit_below(header, unit)),
+        None => SampleColumn::with_name(header, Name::of(header)),
     };
     layout.names.iter().enumerate().map(name).collect()
 }

@@ -7,13 +7,14 @@ use crate::recording::Quantity;
 /// Looks for recordings beside the first. Where they have the same columns, each is described; otherwise nothing is, since a part of the
 /// file would pass for all of it. `false` where there is one recording.
 pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) -> bool {
-    let named = |quantity: Quantity| -> Vec<usize> {
-        let is = |n: &usize| sample.columns[*n].named_for() == Some(quantity);
+    let of_quantity = |quantity: Quantity| -> Vec<usize> {
+        let is = |n: &usize| sample.columns[*n].quantity_by_name() == Some(quantity);
         (0..sample.columns.len()).filter(is).collect()
     };
-    let [times, pressures, forces] = [Quantity::Time, Quantity::Pressure, Quantity::Force].map(named);
-    let strokes =
-        [Quantity::Displacement, Quantity::Length, Quantity::Contraction].map(|q| named(q).len()).into_iter();
+    let [times, pressures, forces] = [Quantity::Time, Quantity::Pressure, Quantity::Force].map(of_quantity);
+    let strokes = [Quantity::Displacement, Quantity::Length, Quantity::Contraction]
+        .map(|q| of_quantity(q).len())
+        .into_iter();
     let recordings = forces.len();
     if recordings < 2 {
         return false;
@@ -54,7 +55,7 @@ fn describe(sample: &Sample, recordings: usize, step: usize, used: &mut [bool], 
         let (a, b) = (&sample.columns[n], sample.columns.get(other));
         b.is_some_and(|b| {
             let unit = |c: &super::sample::SampleColumn| c.name.unit.map(|u| u.text);
-            a.named_for() == b.named_for() && unit(a) == unit(b)
+            a.quantity_by_name() == b.quantity_by_name() && unit(a) == unit(b)
         })
     };
     let all: Vec<usize> = (1..recordings).flat_map(|k| own.iter().map(move |n| n + k * step)).collect();

@@ -123,7 +123,7 @@ fn sign(sample: &Sample, guess: &mut Guess) {
         values(Quantity::Force).map(|(sign, force)| force.iter().map(|f| sign * f).collect());
     // An uncalibrated reading shows the sign as well, where nothing better is there.
     let raw = || {
-        let is_force = |c: &&SampleColumn| c.is_numeric() && c.named_for() == Some(Quantity::Force);
+        let is_force = |c: &&SampleColumn| c.is_numeric() && c.quantity_by_name() == Some(Quantity::Force);
         sample.columns.iter().find(is_force).map(|c| c.numbers.clone())
     };
     let force = force.or_else(raw);

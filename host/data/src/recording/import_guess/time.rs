@@ -12,7 +12,7 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
     if guess.has(Quantity::Time) {
         return;
     }
-    let is_time = |c: &SampleColumn| c.named_for() == Some(Quantity::Time);
+    let is_time = |c: &SampleColumn| c.quantity_by_name() == Some(Quantity::Time);
     let stamped = |(n, c): &(usize, &SampleColumn)| !used[*n] && c.is_stamped();
     let all = || sample.columns.iter().enumerate();
     // A file may have a column of dates and one of times of day: that named for the time is looked for first.
@@ -48,7 +48,7 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
     }
     let unnamed = |(n, c): &(usize, &SampleColumn)| {
         !used[*n]
-            && c.named_for().is_none()
+            && c.quantity_by_name().is_none()
             && c.name.unit.is_none()
             && values::increases(c)
             && !values::counts_rows(c)

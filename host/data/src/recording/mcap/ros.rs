@@ -28,8 +28,8 @@ pub(super) fn read(definition: &Definition, message: &[u8], values: &mut Values)
     let mut reader = match definition.version {
         Version::Ros1 => Reader { bytes: message, at: 0, big: false, align: 1, fields },
         Version::Ros2 => {
-            let (head, bytes) = message.split_first_chunk::<4>()?;
-            let (big, align) = match head[..2] {
+            let (header, bytes) = message.split_first_chunk::<4>()?;
+            let (big, align) = match header[..2] {
                 [0, 0] => (true, 8),
                 [0, 1] => (false, 8),
                 [0, 6] => (true, 4),
@@ -107,7 +107,7 @@ impl<'a> Reader<'a> {
         let count = match part.count {
             Count::One => return self.one(definition, part.kind, path, values, depth),
             Count::Fixed(count) => count,
-            Count::Counted => self.word(4)? as usize,
+            Count::LengthPrefixed => self.word(4)? as usize,
         };
         if count > LONGEST_ARRAY {
             path = None;

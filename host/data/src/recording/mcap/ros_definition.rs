@@ -34,7 +34,7 @@ pub(super) enum Count {
     One,
     Fixed(usize),
     /// The length is in the message.
-    Counted,
+    LengthPrefixed,
 }
 
 /// One field of a definition.
@@ -116,8 +116,8 @@ fn part(line: &str) -> Result<Option<Unresolved<'_>>, String> {
     }
     let (kind, count) = match kind.strip_suffix(']').and_then(|k| k.rsplit_once('[')) {
         None => (kind, Count::One),
-        Some((kind, "")) => (kind, Count::Counted),
-        Some((kind, bound)) if bound.starts_with("<=") => (kind, Count::Counted),
+        Some((kind, "")) => (kind, Count::LengthPrefixed),
+        Some((kind, bound)) if bound.starts_with("<=") => (kind, Count::LengthPrefixed),
         Some((kind, count)) => (kind, Count::Fixed(count.trim().parse().map_err(|_| wrong())?)),
     };
     let kind = kind.split_once("<=").map_or(kind, |(kind, _)| kind);
@@ -164,8 +164,8 @@ mod tests {
         assert_eq!(
             parts,
             [
-                ("x", Kind::Float(8), Count::Counted),
-                ("few", Kind::Signed(4), Count::Counted),
+                ("x", Kind::Float(8), Count::LengthPrefixed),
+                ("few", Kind::Signed(4), Count::LengthPrefixed),
                 ("g", Kind::Float(4), Count::Fixed(3)),
                 ("label", Kind::Text, Count::One),
                 ("header", Kind::Message(1), Count::One),

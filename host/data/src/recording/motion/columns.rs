@@ -1,14 +1,14 @@
 //! What follows from the reversals and holds of a recording, sample by sample.
 
 use super::criteria::CYCLE_SHARE;
-use super::{Cause, Motion, Recording, Turn};
+use super::{Cause, Motion, Recording, Reversal};
 
 /// Columns that follow from a motion, one value per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MotionColumns {
-    /// Travel since the last turn, m.
+    /// Travel since the last reversal, m.
     pub travel: Vec<f64>,
-    /// Time since the last turn, s; since the start of the recording before the first.
+    /// Time since the last reversal, s; since the start of the recording before the first.
     pub since_reversal: Vec<f64>,
     /// How long the muscle has been resting, or rested before its present motion, s.
     pub hold_time: Vec<f64>,
@@ -28,8 +28,8 @@ impl Motion {
             hold_time: vec![0.0; n],
             cycle: recording.cycle.clone().unwrap_or_else(|| self.cycles(recording)),
         };
-        let mut starts = self.turns.iter().map(|t| t.index).peekable();
-        // The turn itself lies between two samples; the one before is the nearer estimate of where it was.
+        let mut starts = self.reversals.iter().map(|t| t.index).peekable();
+        // The reversal itself lies between two samples; the one before is the nearer estimate of where it was.
         let mut from = 0;
         let mut farthest = 0.0_f64;
         for i in 0..n {
@@ -43,14 +43,14 @@ impl Motion {
         }
         for (k, hold) in self.holds.iter().enumerate() {
             // The rest before a motion counts until that motion turns or rests.
-            let mut turn = self.turns.partition_point(|t| t.index <= hold.end);
-            let leaving = |t: &Turn| {
+            let mut reversal = self.reversals.partition_point(|t| t.index <= hold.end);
+            let leaving = |t: &Reversal| {
                 t.index <= hold.end + 2 || (stroke[t.index] - hold.stroke).abs() <= self.stroke_threshold
             };
-            while self.turns.get(turn).is_some_and(leaving) {
-                turn += 1;
+            while self.reversals.get(reversal).is_some_and(leaving) {
+                reversal += 1;
             }
-            let until = self.turns.get(turn).map_or(n, |t| t.index);
+            let until = self.reversals.get(reversal).map_or(n, |t| t.index);
             let next = self.holds.get(k + 1).map_or(n, |h| h.start);
             for i in hold.start..until.min(next).max(hold.end + 1).min(n) {
                 columns.hold_time[i] = time[i.min(hold.end)] - time[hold.start];
@@ -69,21 +69,21 @@ impl Motion {
         let mut number = 1;
         let mut begun = 0;
         let mut top = [f64::NEG_INFINITY; 2];
-        for (k, turn) in self.turns.iter().enumerate() {
-            let here = [recording.stroke[turn.index], recording.pressure[turn.index]];
-            let which = usize::from(turn.cause == Cause::Pressure);
-            if turn.direction == 1 && k > 0 {
-                let start = column(turn.cause)[begun];
+        for (k, reversal) in self.reversals.iter().enumerate() {
+            let here = [recording.stroke[reversal.index], recording.pressure[reversal.index]];
+            let which = usize::from(reversal.cause == Cause::Pressure);
+            if reversal.direction == 1 && k > 0 {
+                let start = column(reversal.cause)[begun];
                 if top[which] - here[which] >= CYCLE_SHARE * (top[which] - start) && top[which] > here[which]
                 {
                     number += 1;
-                    begun = turn.index;
+                    begun = reversal.index;
                     top = here;
                 }
             }
             top = [top[0].max(here[0]), top[1].max(here[1])];
-            let end = self.turns.get(k + 1).map_or(n, |t| t.index);
-            cycle[turn.index..end].fill(number);
+            let end = self.reversals.get(k + 1).map_or(n, |t| t.index);
+            cycle[reversal.index..end].fill(number);
         }
         cycle
     }

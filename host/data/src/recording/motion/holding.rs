@@ -7,8 +7,8 @@ use super::criteria::{
     HOLD_REACH, HOLD_SAMPLES, HOLD_TIME, LEVEL_SAMPLES, LONG_HOLD_SHARE, LONG_HOLD_TIME, PACE_PARTS,
     PACE_SAMPLES, SMALL_STROKE,
 };
+use super::legs::Leg;
 use super::scale::Scale;
-use super::turning::Leg;
 use crate::statistics::{median, range};
 
 /// A stretch of samples at held length, both ends included.

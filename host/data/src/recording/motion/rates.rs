@@ -28,14 +28,14 @@ impl Rates {
     #[must_use]
     pub fn of(recording: &Recording, motion: &Motion) -> Self {
         let n = recording.len();
-        let mut edges: Vec<usize> = motion.turns.iter().map(|t| t.index).collect();
+        let mut edges: Vec<usize> = motion.reversals.iter().map(|t| t.index).collect();
         edges.extend(motion.holds.iter().flat_map(|h| [h.start, h.end + 1]));
         edges.retain(|e| *e > 0 && *e < n);
         edges.sort_unstable();
         edges.dedup();
         let duration = recording.duration().max(f64::MIN_POSITIVE);
         let travelled: f64 = motion
-            .turns
+            .reversals
             .windows(2)
             .map(|w| (recording.stroke[w[1].index] - recording.stroke[w[0].index]).abs())
             .sum::<f64>()
@@ -87,7 +87,7 @@ fn derivatives(
     let (least, most) = RATE_HALF_SAMPLES;
     let half = if wanted < most as f64 { (wanted as usize).max(least) } else { most };
     let stride = half.div_ceil(RATE_SAMPLES);
-    let reach = half / stride;
+    let half_window = half / stride;
     let averaged;
     let column = if stride > 1 {
         averaged = moving_mean(column, stride | 1);
@@ -109,7 +109,7 @@ fn derivatives(
                 }
                 let low = edge.checked_sub(1).map_or(0, |e| edges[e]);
                 let high = edges.get(edge).map_or(n, |e| *e) - 1;
-                (*slope, *curve) = parabola(time, column, i, low, high, stride, reach);
+                (*slope, *curve) = parabola(time, column, i, low, high, stride, half_window);
             }
         },
     );
@@ -124,13 +124,13 @@ fn parabola(
     low: usize,
     high: usize,
     stride: usize,
-    reach: usize,
+    half_window: usize,
 ) -> (f64, f64) {
-    let before = ((i - low) / stride).min(reach);
-    let after = ((high - i) / stride).min(reach);
+    let before = ((i - low) / stride).min(half_window);
+    let after = ((high - i) / stride).min(half_window);
     // Near an edge the window extends to the other side, so that it keeps its width.
-    let before = before.max((2 * reach - after).min((i - low) / stride));
-    let after = after.max((2 * reach - before).min((high - i) / stride));
+    let before = before.max((2 * half_window - after).min((i - low) / stride));
+    let after = after.max((2 * half_window - before).min((high - i) / stride));
     let from = i - before * stride;
     let (mut s1, mut s2, mut s3, mut s4) = (0.0, 0.0, 0.0, 0.0);
     let (mut y0, mut y1, mut y2) = (0.0, 0.0, 0.0);

@@ -2,12 +2,12 @@
 
 use super::criteria::{HOLD_DRIFT, ONSET_CLEAR, PRESSURE_ONSET};
 use super::holding::{Hold, sampled_median};
-use super::turning::{Leg, Track, legs};
-use super::{Cause, Turn};
+use super::legs::{Leg, Track, legs};
+use super::{Cause, Reversal};
 
-/// The turns that the stroke makes.
-pub(super) fn stroke_turns(track: &Track<'_>, legs: &[Leg], holds: &[Hold]) -> Vec<Turn> {
-    let mut turns = Vec::with_capacity(legs.len());
+/// The reversals that the stroke makes.
+pub(super) fn stroke_reversals(track: &Track<'_>, legs: &[Leg], holds: &[Hold]) -> Vec<Reversal> {
+    let mut reversals = Vec::with_capacity(legs.len());
     for (n, leg) in legs.iter().enumerate() {
         let before = n.checked_sub(1).map(|b| &legs[b]);
         // A rest where the leg starts: at its level, and not left before it.
@@ -26,7 +26,7 @@ pub(super) fn stroke_turns(track: &Track<'_>, legs: &[Leg], holds: &[Hold]) -> V
                 let level = sampled_median(&track.raw[late..=hold.end]);
                 track.departure(leg, hold.start, level, track.tolerance())
             }
-            (None, Some(before)) => track.turn(before, leg),
+            (None, Some(before)) => track.reversal(before, leg),
             // The recording starts with this leg: at rest or in motion.
             (None, None) => {
                 if leg.start == 0 {
@@ -36,19 +36,23 @@ pub(super) fn stroke_turns(track: &Track<'_>, legs: &[Leg], holds: &[Hold]) -> V
                 }
             }
         };
-        turns.push(Turn { index, direction: if leg.sign() > 0.0 { 1 } else { -1 }, cause: Cause::Stroke });
+        reversals.push(Reversal {
+            index,
+            direction: if leg.sign() > 0.0 { 1 } else { -1 },
+            cause: Cause::Stroke,
+        });
     }
-    turns
+    reversals
 }
 
-/// Adds the turns that the pressure makes at held length; the stroke's own stay.
-pub(super) fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) -> Vec<Turn> {
-    let mut turns = stroke;
+/// Adds the reversals that the pressure makes at held length; the stroke's own stay.
+pub(super) fn with_pressure(stroke: Vec<Reversal>, holds: &[Hold], air: &Track<'_>) -> Vec<Reversal> {
+    let mut reversals = stroke;
     let mut added = Vec::new();
     for hold in holds {
         let part = &air.raw[hold.start..=hold.end];
         let legs = legs(part, air.threshold);
-        let mut has_turned = false;
+        let mut has_reversed = false;
         for leg in &legs {
             let leg = Leg { start: leg.start + hold.start, end: leg.end + hold.start, ..*leg };
             let tolerance = (ONSET_CLEAR * air.noise).max(PRESSURE_ONSET * air.threshold);
@@ -57,47 +61,47 @@ pub(super) fn with_pressure(stroke: Vec<Turn>, holds: &[Hold], air: &Track<'_>) 
                 1 if leg.start == 0 => 0,
                 index => index,
             };
-            added.push(Turn {
+            added.push(Reversal {
                 index,
                 direction: if leg.sign() > 0.0 { 1 } else { -1 },
                 cause: Cause::Pressure,
             });
-            has_turned = true;
+            has_reversed = true;
         }
         // What drives the muscle after the hold is its motion again, even the same way as before the hold.
-        if has_turned {
-            let resumes = |t: &&Turn| t.index <= hold.end + 1;
-            let last = turns.iter().rev().find(resumes).copied();
-            let at_end = turns.iter().any(|t| t.index > hold.start && t.index <= hold.end + 2);
+        if has_reversed {
+            let resumes = |t: &&Reversal| t.index <= hold.end + 1;
+            let last = reversals.iter().rev().find(resumes).copied();
+            let at_end = reversals.iter().any(|t| t.index > hold.start && t.index <= hold.end + 2);
             if let Some(last) = last
                 && !at_end
                 && hold.end + 1 < air.time.len()
             {
-                added.push(Turn { index: hold.end + 1, ..last });
+                added.push(Reversal { index: hold.end + 1, ..last });
             }
         }
     }
-    turns.extend(added);
+    reversals.extend(added);
     // A stable sort: where both fall on one sample the stroke, which stands first, is overruled by nothing.
-    turns.sort_by_key(|t| (t.index, t.cause == Cause::Stroke));
-    turns.dedup_by(|later, earlier| {
+    reversals.sort_by_key(|t| (t.index, t.cause == Cause::Stroke));
+    reversals.dedup_by(|later, earlier| {
         let same = later.index == earlier.index;
         if same {
             *earlier = *later;
         }
         same
     });
-    turns
+    reversals
 }
 
-pub(super) fn stated_turns(directions: &[i8]) -> Vec<Turn> {
+pub(super) fn stated_reversals(directions: &[i8]) -> Vec<Reversal> {
     let mut last = 0;
-    let mut turns = Vec::new();
+    let mut reversals = Vec::new();
     for (index, way) in directions.iter().copied().enumerate().filter(|(_, d)| *d != 0) {
         if way != last {
-            turns.push(Turn { index, direction: way.signum(), cause: Cause::Stated });
+            reversals.push(Reversal { index, direction: way.signum(), cause: Cause::Stated });
             last = way;
         }
     }
-    turns
+    reversals
 }

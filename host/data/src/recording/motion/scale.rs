@@ -6,7 +6,7 @@ use super::criteria::{
     NOISE_LAG, NOISE_LAG_PART, NOISE_RISE, ONSET_CLEAR, PRESSURE_NOISE_MOST, QUANTUM_SHARE, RIPPLE_LARGEST,
     RIPPLE_RAISE, RIPPLE_RAISES, RIPPLE_SMALL, RIPPLE_STROKES, SMOOTHING_MOST, SMOOTHING_PART,
 };
-use super::turning::{Leg, legs};
+use super::legs::{Leg, legs};
 use crate::statistics::{median, range};
 
 /// The scale of a column's noise.

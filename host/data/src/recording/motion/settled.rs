@@ -15,7 +15,7 @@ pub fn fast_step(range: f64) -> f64 {
 
 /// By how much a column with this range must come back before it has turned.
 #[must_use]
-pub fn turn(range: f64) -> f64 {
+pub fn reversal_threshold(range: f64) -> f64 {
     TURN * range
 }
 
@@ -98,7 +98,7 @@ pub fn settled_way(pressure: &[f64], settled: &[bool]) -> Vec<f64> {
     let rows: Vec<usize> = (0..pressure.len()).filter(|i| settled[*i]).collect();
     let values: Vec<f64> = rows.iter().map(|i| pressure[*i]).collect();
     let span = range(&values);
-    let known = way(&values, turn(span), TURN_HOLD * span);
+    let known = way(&values, reversal_threshold(span), TURN_HOLD * span);
     let mut all = vec![1.0; pressure.len()];
     let mut next = 0;
     for (i, d) in all.iter_mut().enumerate() {

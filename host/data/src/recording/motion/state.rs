@@ -5,14 +5,14 @@ use std::ops::Range;
 use super::criteria::{
     DOUBT_SAMPLES, ONSET_CLEAR, RAMP_MARGIN, RAMP_MARGIN_SAMPLES, RAMP_NOISE, RAMP_SETTLES, RAMP_STEADY,
 };
-use super::{Cause, Motion, Recording, Turn};
+use super::{Cause, Motion, Recording, Reversal};
 use crate::statistics::median;
 
 /// The state of the motion, one value per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MotionState {
     /// Reversals so far in this recording.
-    pub turns: Vec<u32>,
+    pub reversals: Vec<u32>,
     /// Number of the half-stroke or hold within the recording.
     pub piece: Vec<u32>,
     /// Whether the length is held.
@@ -48,21 +48,21 @@ impl Motion {
 
     /// Numbers the reversals and the half-strokes and holds between them.
     fn count(&self, state: &mut MotionState) {
-        let mut starts = self.turns.iter().map(|t| t.index).peekable();
-        let (mut turns, mut piece) = (0, 0);
+        let mut starts = self.reversals.iter().map(|t| t.index).peekable();
+        let (mut reversals, mut piece) = (0, 0);
         for row in 0..state.held.len() {
-            let turned = starts.next_if(|t| *t <= row).is_some();
-            turns += u32::from(turned);
-            piece += u32::from(row > 0 && (turned || state.held[row] != state.held[row - 1]));
-            state.turns.push(turns);
+            let reversed = starts.next_if(|t| *t <= row).is_some();
+            reversals += u32::from(reversed);
+            piece += u32::from(row > 0 && (reversed || state.held[row] != state.held[row - 1]));
+            state.reversals.push(reversals);
             state.piece.push(piece);
         }
     }
 
     /// Marks the samples whose direction is not known beyond doubt.
     fn doubt(&self, recording: &Recording, state: &mut MotionState) {
-        for turn in &self.turns {
-            for row in self.doubtful(recording, turn, &state.held) {
+        for reversal in &self.reversals {
+            for row in self.doubtful(recording, reversal, &state.held) {
                 state.sure[row] = false;
             }
         }
@@ -73,22 +73,24 @@ impl Motion {
         }
     }
 
-    /// The samples about a turn whose side noise leaves in doubt: those that lie within the noise of where the column turned, one on
-    /// either side at least. After a hold the turn is as uncertain backward as it is forward.
-    fn doubtful(&self, recording: &Recording, turn: &Turn, held: &[bool]) -> Range<usize> {
-        let (column, noise) = match turn.cause {
+    /// The samples about a reversal whose side noise leaves in doubt: those that lie within the noise of where the column turned, one on
+    /// either side at least. After a hold the reversal is as uncertain backward as it is forward.
+    fn doubtful(&self, recording: &Recording, reversal: &Reversal, held: &[bool]) -> Range<usize> {
+        let (column, noise) = match reversal.cause {
             Cause::Stroke => (&recording.stroke, self.stroke_noise),
             Cause::Pressure => (&recording.pressure, self.pressure_noise),
-            Cause::Stated => return turn.index..turn.index,
+            Cause::Stated => return reversal.index..reversal.index,
         };
         let n = held.len().min(column.len());
-        let Some(level) = column.get(turn.index).copied().filter(|_| turn.index < n) else { return 0..0 };
+        let Some(level) = column.get(reversal.index).copied().filter(|_| reversal.index < n) else {
+            return 0..0;
+        };
         let near = |i: &usize| (column[*i] - level).abs() <= ONSET_CLEAR * noise;
-        let after = (turn.index + 1..n).take(DOUBT_SAMPLES).take_while(near).count() + 1;
-        let rests = turn.cause == Cause::Pressure || turn.index > 0 && held[turn.index - 1];
+        let after = (reversal.index + 1..n).take(DOUBT_SAMPLES).take_while(near).count() + 1;
+        let rests = reversal.cause == Cause::Pressure || reversal.index > 0 && held[reversal.index - 1];
         let most = if rests { after } else { DOUBT_SAMPLES };
-        let before = (0..turn.index.saturating_sub(1)).rev().take_while(near).take(most - 1).count() + 1;
-        turn.index.saturating_sub(before)..(turn.index + after).min(n)
+        let before = (0..reversal.index.saturating_sub(1)).rev().take_while(near).take(most - 1).count() + 1;
+        reversal.index.saturating_sub(before)..(reversal.index + after).min(n)
     }
 
     /// Times how long the braid has been still.
@@ -96,9 +98,9 @@ impl Motion {
         let (time, pressure) = (&recording.time, &recording.pressure);
         let mut from = 0;
         for row in 0..state.held.len() {
-            let turned = row > 0 && state.turns[row] != state.turns[row - 1];
+            let reversed = row > 0 && state.reversals[row] != state.reversals[row - 1];
             let driven = (pressure[row] - pressure[from]).abs() > self.pressure_threshold;
-            if !state.held[row] || turned || driven {
+            if !state.held[row] || reversed || driven {
                 from = row;
             }
             state.still.push(time[row] - time[from]);
@@ -131,17 +133,18 @@ impl Motion {
         let (time, pressure) = (&recording.time, &recording.pressure);
         let n = state.held.len();
         state.on_ramp = vec![false; n];
-        let mut turn = 0;
+        let mut reversal = 0;
         for row in 1..n.min(pressure_rate.len()) {
             let direction = f64::from(self.direction[row]);
             let goes_on = state.ramped[row]
                 && state.ramped[row - 1]
                 && self.direction[row] == self.direction[row - 1]
-                && state.turns[row] == state.turns[row - 1];
+                && state.reversals[row] == state.reversals[row - 1];
             if !goes_on {
-                turn = row;
+                reversal = row;
             }
-            let (passed, gone) = (time[row] - time[turn], (pressure[row] - pressure[turn]) * direction);
+            let (passed, gone) =
+                (time[row] - time[reversal], (pressure[row] - pressure[reversal]) * direction);
             let steady = pressure_rate[row] * direction > RAMP_STEADY * gone / passed.max(f64::MIN_POSITIVE);
             state.on_ramp[row] = state.ramped[row]
                 && state.held[row]
@@ -311,7 +314,7 @@ mod tests {
 
     #[test]
     fn a_rest_keeps_its_direction_up_to_its_end() {
-        // 10 s of rest between strokes of 1 mm/s: only the samples beside the two turns are in doubt, not the rest.
+        // 10 s of rest between strokes of 1 mm/s: only the samples beside the two reversals are in doubt, not the rest.
         let stroke = (0..600).map(|i| match i % 300 {
             0..100 => 1e-4 * f64::from(i % 300),
             100..200 => 1e-2,

@@ -77,7 +77,7 @@ fn wrong(truth: &Truth, found: &Motion) -> Vec<usize> {
     (0..truth.direction.len()).filter(|i| truth.direction[*i] != found.direction[*i]).collect()
 }
 
-fn turns(direction: &[i8]) -> usize {
+fn reversals(direction: &[i8]) -> usize {
     direction.windows(2).filter(|w| w[0] != w[1]).count()
 }
 
@@ -94,7 +94,7 @@ fn triangles_turn_at_the_right_sample() {
         let truth = carry_out(&loops(3, 27.03 * MM, 1.0 * MM), 10.0, 2e-6, 250.0, seed);
         let found = Motion::of(&truth.recording);
         assert_eq!(wrong(&truth, &found), Vec::<usize>::new(), "seed {seed}");
-        assert_eq!(found.turns.len(), 6);
+        assert_eq!(found.reversals.len(), 6);
     }
 }
 
@@ -108,8 +108,8 @@ fn without_any_noise_every_sample_is_right() {
 }
 
 #[test]
-fn smooth_turns_are_no_rests() {
-    // Off by no more than the time in which a sine moves by some standard deviations of the noise about its turn.
+fn smooth_reversals_are_no_rests() {
+    // Off by no more than the time in which a sine moves by some standard deviations of the noise about its reversal.
     for (rate, noise, allowed) in
         [(10.0, 0.0, 0), (100.0, 0.0, 0), (1000.0, 0.0, 0), (1000.0, 5e-6, 40), (100.0, 2e-6, 4)]
     {
@@ -126,13 +126,13 @@ fn smooth_turns_are_no_rests() {
             ..Recording::default()
         };
         let found = Motion::of(&recording);
-        let turns: Vec<usize> = found.turns.iter().skip(1).map(|t| t.index).collect();
-        assert_eq!(turns.len(), 13, "{rate} Hz {noise} m: {:?}", found.turns);
-        for (k, turn) in turns.iter().enumerate() {
+        let reversals: Vec<usize> = found.reversals.iter().skip(1).map(|t| t.index).collect();
+        assert_eq!(reversals.len(), 13, "{rate} Hz {noise} m: {:?}", found.reversals);
+        for (k, reversal) in reversals.iter().enumerate() {
             let truth = ((k + 1) as f64 * std::f64::consts::PI / 0.713 * rate).ceil() as i64;
             assert!(
-                (*turn as i64 - truth).abs() <= allowed,
-                "{rate} Hz {noise} m: {turn} for {truth} {:?}",
+                (*reversal as i64 - truth).abs() <= allowed,
+                "{rate} Hz {noise} m: {reversal} for {truth} {:?}",
                 found.holds
             );
         }
@@ -207,7 +207,7 @@ fn slow_motion_under_noise_turns_within_what_noise_hides() {
     for seed in 1..6 {
         let truth = carry_out(&loops(2, 3.0 * MM, 0.3 * MM), 1000.0, 10e-6, 250.0, seed);
         let found = Motion::of(&truth.recording);
-        assert_eq!(turns(&found.direction), 3, "seed {seed}");
+        assert_eq!(reversals(&found.direction), 3, "seed {seed}");
         assert!(wrong(&truth, &found).len() < 30, "seed {seed}: {} wrong", wrong(&truth, &found).len());
     }
 }
@@ -226,7 +226,13 @@ fn direction_is_kept_through_a_rest_and_changes_when_motion_continues() {
     for (rate, noise) in [(10.0, 2e-6), (100.0, 2e-6), (100.0, 20e-6), (1000.0, 5e-6)] {
         let truth = carry_out(&path, rate, noise, 250.0, 3);
         let found = Motion::of(&truth.recording);
-        assert_eq!(turns(&found.direction), 2, "{rate} Hz {noise} m: {:?} {:?}", found.turns, found.holds);
+        assert_eq!(
+            reversals(&found.direction),
+            2,
+            "{rate} Hz {noise} m: {:?} {:?}",
+            found.reversals,
+            found.holds
+        );
         assert!(
             wrong(&truth, &found).len() as f64 <= 2.0 + 0.03 * rate,
             "{rate} Hz {noise} m: {:?}",
@@ -255,8 +261,8 @@ fn at_held_length_the_pressure_decides() {
     for (rate, noise) in [(10.0, 0.0), (10.0, 2e-6), (106.0, 5e-6)] {
         let truth = carry_out(&path, rate, noise, 250.0, 5);
         let found = Motion::of(&truth.recording);
-        assert_eq!(turns(&found.direction), 3, "{:?}", found.turns);
-        let at: Vec<f64> = found.turns.iter().map(|t| truth.recording.time[t.index]).collect();
+        assert_eq!(reversals(&found.direction), 3, "{:?}", found.reversals);
+        let at: Vec<f64> = found.reversals.iter().map(|t| truth.recording.time[t.index]).collect();
         for (found, true_time) in at.iter().zip([2.0, 11.0, 22.0]) {
             assert!((found - true_time).abs() < 0.25, "{at:?}");
         }
@@ -274,7 +280,7 @@ fn a_rest_with_pressure_in_the_middle_of_a_stroke() {
     ];
     let truth = carry_out(&path, 50.0, 3e-6, 250.0, 8);
     let found = Motion::of(&truth.recording);
-    assert_eq!(turns(&found.direction), 3, "{:?}", found.turns);
+    assert_eq!(reversals(&found.direction), 3, "{:?}", found.reversals);
     assert!(wrong(&truth, &found).len() <= 12, "{:?}", wrong(&truth, &found));
 }
 
@@ -282,7 +288,7 @@ fn a_rest_with_pressure_in_the_middle_of_a_stroke() {
 fn ripple_and_noise_at_rest_flip_nothing() {
     let truth = carry_out(&[Piece::Rest(600.0)], 100.0, 20e-6, 1500.0, 2);
     let found = Motion::of(&truth.recording);
-    assert!(found.direction.iter().all(|d| *d == 0), "{:?}", found.turns);
+    assert!(found.direction.iter().all(|d| *d == 0), "{:?}", found.reversals);
 }
 
 #[test]
@@ -374,7 +380,7 @@ fn a_rest_is_one_even_where_noise_bends_it() {
     let truth =
         carry_out(&path, 124.81665814799626, 18.239_109_915_835_14e-6, 250.0, 14_148_753_286_867_760_998);
     let found = Motion::of(&truth.recording);
-    assert_eq!(turns(&found.direction), turns(&truth.direction), "{:?}", found.turns);
+    assert_eq!(reversals(&found.direction), reversals(&truth.direction), "{:?}", found.reversals);
     let off = wrong(&truth, &found).len();
     assert!(off < 40, "{off} samples have the wrong direction");
 }
@@ -383,7 +389,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(64)))]
 
     #[test]
-    fn noisy_motion_gives_its_true_turns(
+    fn noisy_motion_gives_its_true_reversals(
         seed: u64,
         points in prop::collection::vec((2.0..12.0f64, 0.3..4.0f64, 0.0..12.0f64), 2..7),
         rate in 20.0..400.0f64,
@@ -406,12 +412,12 @@ proptest! {
         }
         let truth = carry_out(&path, rate, noise, 250.0, seed);
         let found = Motion::of(&truth.recording);
-        prop_assert_eq!(turns(&found.direction), turns(&truth.direction), "{:?}", found.turns);
-        // A turn is uncertain by the time in which the stroke moves by some standard deviations of the noise.
+        prop_assert_eq!(reversals(&found.direction), reversals(&truth.direction), "{:?}", found.reversals);
+        // A reversal is uncertain by the time in which the stroke moves by some standard deviations of the noise.
         let slowest = points.iter().map(|p| p.1 * MM).fold(f64::INFINITY, f64::min);
         let each = 2.0 + 4.0 * noise / slowest * rate;
         let off = wrong(&truth, &found).len() as f64;
-        prop_assert!(off <= each * points.len() as f64, "{off} of {each} per turn");
+        prop_assert!(off <= each * points.len() as f64, "{off} of {each} per reversal");
     }
 
     #[test]

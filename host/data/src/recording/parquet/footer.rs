@@ -119,21 +119,21 @@ impl Footer<'_> {
     /// The type of the next field of a structure, and its number; none at the structure's end.
     #[expect(clippy::option_option, reason = "the outer one is a footer that breaks off")]
     fn field(&mut self, number: &mut i64) -> Option<Option<u8>> {
-        let head = self.byte()?;
-        if head == 0 {
+        let header = self.byte()?;
+        if header == 0 {
             return Some(None);
         }
-        *number = match head >> 4 {
+        *number = match header >> 4 {
             0 => self.varint()? as i64 / 2,
             step => number.wrapping_add(i64::from(step)),
         };
-        Some(Some(head & 15))
+        Some(Some(header & 15))
     }
 
     fn list(&mut self) -> Option<(u64, u8)> {
-        let head = self.byte()?;
-        let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
-        Some((count, head & 15))
+        let header = self.byte()?;
+        let count = if header >> 4 == 15 { self.varint()? } else { u64::from(header >> 4) };
+        Some((count, header & 15))
     }
 
     fn skip(&mut self, kind: u8, depth: usize) -> Option<()> {

@@ -1,6 +1,6 @@
 //! Sensors that read one value through a whole recording, which the other readings exclude.
 
-use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual, stride, thinned};
+use super::{Campaign, Channel, Kind, Recording, SensorFault, Usual, downsampled, stride};
 use crate::statistics::{extremes, quantile};
 
 /// A dead sensor's readings stay within this share of the campaign's range of the column: its noise, or the drift of an amplifier.
@@ -21,7 +21,7 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
     }
     // Where lengths are held, a constant stroke is the bench's way of working.
     let moving = |r: &&Recording| {
-        let mut readings: Vec<f64> = thinned(&r.stroke).collect();
+        let mut readings: Vec<f64> = downsampled(&r.stroke).collect();
         quantile(&mut readings, 0.98) - quantile(&mut readings, 0.02)
             > DEAD * usual.spans[Channel::Stroke as usize]
     };
@@ -31,10 +31,10 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
         !skipped[*recording] && r.force.is_some() && !r.is_empty() && !is_dead(r, Channel::Force, usual)
     };
     let (low, high) = extremes(
-        campaign.recordings.iter().enumerate().filter(pulling).flat_map(|(_, r)| thinned(&r.stroke)),
+        campaign.recordings.iter().enumerate().filter(pulling).flat_map(|(_, r)| downsampled(&r.stroke)),
     );
     let compared = |r: &Recording| {
-        let mut strokes: Vec<f64> = thinned(&r.stroke).collect();
+        let mut strokes: Vec<f64> = downsampled(&r.stroke).collect();
         (low..=high).contains(&quantile(&mut strokes, 0.5))
     };
     let judge = |(recording, r): (usize, &Recording)| {
@@ -44,7 +44,7 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
         let judged = Channel::ALL.into_iter().filter(|c| *c != Channel::Stroke || strokes);
         let dead = |c: &Channel| is_dead(r, *c, usual) && (*c != Channel::Force || compared(r));
         let channel = judged.into_iter().find(dead)?;
-        let mut readings: Vec<f64> = thinned(channel.of(r)).collect();
+        let mut readings: Vec<f64> = downsampled(channel.of(r)).collect();
         let value = quantile(&mut readings, 0.5);
         Some(SensorFault { recording, rows: 0..r.len(), channel, kind: Kind::Dead, value })
     };
@@ -53,7 +53,7 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
 
 fn is_dead(r: &Recording, channel: Channel, usual: &Usual) -> bool {
     let span = usual.spans[channel as usize];
-    let mut readings: Vec<f64> = thinned(channel.of(r)).collect();
+    let mut readings: Vec<f64> = downsampled(channel.of(r)).collect();
     let spread = quantile(&mut readings, 0.98) - quantile(&mut readings, 0.02);
     if !(span > 0.0 && spread <= DEAD * span) {
         return false;

@@ -103,7 +103,7 @@ fn is_away(
             let (force, expected) = (channel.of(r), usual.expected.at(r, rows.start));
             (force[rows.start] - expected).abs() > (force[rows.start - 1] - expected).abs()
                 && is_sudden(force, &rows)
-                && !turns_with_friction(force, motion, &rows, usual)
+                && !reverses_with_friction(force, motion, &rows, usual)
                 && ![Channel::Pressure, Channel::Stroke].iter().any(|c| rests(c.of(r), &rows))
         }
     }
@@ -117,10 +117,15 @@ fn is_sudden(force: &[f64], rows: &Range<usize>) -> bool {
 
 /// Whether friction explains that the force steps away and back: the muscle turns, stops or sets off at both ends. Where a slow turn hides in
 /// the noise of the stroke, the muscle is slow there, and the force steps no farther than friction usually makes it.
-fn turns_with_friction(force: &[f64], motion: &StrokeMotion<'_>, rows: &Range<usize>, usual: &Usual) -> bool {
+fn reverses_with_friction(
+    force: &[f64],
+    motion: &StrokeMotion<'_>,
+    rows: &Range<usize>,
+    usual: &Usual,
+) -> bool {
     let step = (force[rows.start] - force[rows.start - 1]).abs();
     let ends = [rows.start, rows.end];
-    ends.iter().all(|end| motion.turns(*end, rows.len()))
+    ends.iter().all(|end| motion.reverses(*end, rows.len()))
         || step <= usual.noticeable(0.0) && ends.iter().all(|end| motion.is_slow(*end))
 }
 

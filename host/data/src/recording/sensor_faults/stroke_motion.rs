@@ -42,7 +42,7 @@ impl<'a> StrokeMotion<'a> {
     }
 
     /// Whether the muscle turns, stops or sets off by a row, as the motion in this number of rows before and after shows.
-    pub(super) fn turns(&self, row: usize, rows: usize) -> bool {
+    pub(super) fn reverses(&self, row: usize, rows: usize) -> bool {
         let rows = rows.max(TURN_ROWS);
         let near = row.saturating_sub(TURN_ROWS)..self.stroke.len().min(row + 2);
         near.into_iter().any(|k| self.before(k, rows) != self.after(k, rows))
@@ -79,8 +79,8 @@ mod tests {
         let there_and_back = |i: usize| 300.0 - (i as f64 - 300.0).abs();
         let stroke: Vec<f64> = (0..600).map(|i| there_and_back(i) + 0.1 * noise(i)).collect();
         let motion = StrokeMotion::of(&stroke);
-        assert!(motion.turns(300, 4) && motion.turns(301, 4));
-        assert!(!motion.turns(100, 4) && !motion.is_slow(100));
+        assert!(motion.reverses(300, 4) && motion.reverses(301, 4));
+        assert!(!motion.reverses(100, 4) && !motion.is_slow(100));
         let parabola: Vec<f64> =
             (0..600).map(|i| 1e-3 * (i as f64 - 300.0).powi(2) + 0.1 * noise(i)).collect();
         let motion = StrokeMotion::of(&parabola);

@@ -115,20 +115,20 @@ impl Channel {
         big: bool,
         budget: &mut Budget,
     ) -> Result<()> {
-        /// Values that a text takes beside its letters.
+        /// Values that a text takes beside its characters.
         const OVERHEAD: usize = size_of::<String>() / size_of::<f64>() + 1;
         if matches!(&self.data, Data::Numbers(values) if values.is_empty()) {
             self.data = Data::Texts(Vec::new());
         }
         let Data::Texts(texts) = &mut self.data else { return Ok(()) };
-        let letters_at = count.checked_mul(4).ok_or_else(|| damaged("it announces too many texts"))?;
+        let characters_at = count.checked_mul(4).ok_or_else(|| damaged("it announces too many texts"))?;
         let mut ends = Bytes { rest: raw, big };
-        let letters = raw.get(letters_at..).ok_or_else(|| damaged("its texts are cut off"))?;
-        budget.take(count.saturating_mul(OVERHEAD).saturating_add(letters.len() / 8))?;
+        let characters = raw.get(characters_at..).ok_or_else(|| damaged("its texts are cut off"))?;
+        budget.take(count.saturating_mul(OVERHEAD).saturating_add(characters.len() / 8))?;
         let mut from = 0;
         for _ in 0..count {
             let to = ends.u32()? as usize;
-            let text = letters
+            let text = characters
                 .get(from..to)
                 .ok_or_else(|| damaged("the ends of its texts contradict one another"))?;
             texts.push(String::from_utf8_lossy(text).into_owned());
@@ -164,12 +164,12 @@ fn parts(path: &str) -> Vec<String> {
     let mut rest = path;
     while let Some(quoted) = rest.strip_prefix("/'") {
         let mut name = String::new();
-        let mut letters = quoted.char_indices().peekable();
+        let mut characters = quoted.char_indices().peekable();
         let mut end = quoted.len();
-        while let Some((at, letter)) = letters.next() {
-            if letter != '\'' {
-                name.push(letter);
-            } else if letters.next_if(|(_, next)| *next == '\'').is_some() {
+        while let Some((at, character)) = characters.next() {
+            if character != '\'' {
+                name.push(character);
+            } else if characters.next_if(|(_, next)| *next == '\'').is_some() {
                 name.push('\'');
             } else {
                 end = at + 1;

@@ -184,7 +184,7 @@ impl File {
                 rest = after;
                 let Some(channel) = channel.map(|c| &mut self.channels[c]) else { continue };
                 match index.kind {
-                    // Texts that are cut off have lost the letters.
+                    // Texts that are cut off have lost the characters.
                     Kind::Text if (part.len() as u64) < index.size => {}
                     Kind::Text => channel.add_texts(part, index.count as usize, big, &mut self.budget)?,
                     kind => channel.add(kind, part, kind.size(), big, &mut self.budget)?,

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::super::mcap::{END, Encoder};
 use super::Tally;
 use super::window::Window;
-use pam_data::mcap_records::{Chunk, HEAD, LARGEST, MAGIC, header, kind, message, plausible};
+use pam_data::mcap_records::{Chunk, LARGEST, MAGIC, RECORD_HEADER, header, kind, message, plausible};
 
 /// Largest record beside chunks that is taken over: the header, metadata, the attached side file.
 const LARGEST_OTHER: u64 = 4 << 20;
@@ -42,7 +42,7 @@ pub(super) fn copy<R: Read>(source: &mut Window<R>, out: &mut impl Write) -> io:
         if source.peek(1)?.is_empty() {
             break;
         }
-        match if damaged { Found::Damage } else { read_head(source)? } {
+        match if damaged { Found::Damage } else { read_record_header(source)? } {
             Found::End => break,
             Found::Pass(length) => source.skip(length),
             Found::Keep(length) => {
@@ -81,7 +81,7 @@ impl<W: Write> Copy<'_, W> {
             kind::HEADER if self.headed => return Ok(false),
             kind::HEADER => self.headed = true,
             kind::CHUNK => {
-                let Some(chunk) = Chunk::parse(&record[HEAD..]) else { return Ok(false) };
+                let Some(chunk) = Chunk::parse(&record[RECORD_HEADER..]) else { return Ok(false) };
                 if chunk.iter().any(|(kind, _)| kind == kind::CHANNEL) {
                     self.channels = true;
                 }
@@ -128,7 +128,7 @@ fn own(wanted: u8) -> io::Result<Vec<u8>> {
     let begun = Encoder::new(&Value::Null, 0).and_then(|mut e| e.take()).map_err(io::Error::other)?;
     let mut rest = &begun[MAGIC.len()..];
     while let Some((kind, length)) = header(rest) {
-        let (record, after) = rest.split_at_checked(HEAD + length as usize).unwrap_or((rest, &[]));
+        let (record, after) = rest.split_at_checked(RECORD_HEADER + length as usize).unwrap_or((rest, &[]));
         if kind == wanted {
             return Ok(record.to_vec());
         }
@@ -137,19 +137,19 @@ fn own(wanted: u8) -> io::Result<Vec<u8>> {
     Ok(Vec::new())
 }
 
-fn read_head<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
-    let Some((kind, length)) = header(source.peek(HEAD)?) else { return Ok(Found::Damage) };
+fn read_record_header<R: Read>(source: &mut Window<R>) -> io::Result<Found> {
+    let Some((kind, length)) = header(source.peek(RECORD_HEADER)?) else { return Ok(Found::Damage) };
     let most = if kind == kind::CHUNK { LARGEST } else { LARGEST_OTHER };
     if length > most {
         return Ok(Found::Damage);
     }
-    let whole = HEAD + length as usize;
+    let whole = RECORD_HEADER + length as usize;
     // The record and the kind of the one behind it.
     let bytes = source.peek(whole + 1)?;
     if bytes.len() < whole {
         return Ok(Found::Damage);
     }
-    let body = &bytes[HEAD..whole];
+    let body = &bytes[RECORD_HEADER..whole];
     let after = bytes.get(whole).copied();
     // The kind of what follows shows whether the length was right, where no checksum does.
     let followed = after.is_none_or(|kind| (kind::HEADER..=kind::DATA_END).contains(&kind));
@@ -193,34 +193,37 @@ fn skip_to_chunk<R: Read>(source: &mut Window<R>) -> io::Result<(u64, u64)> {
 /// Whether a chunk begins here (`None`: no) and is whole.
 fn chunk_here<R: Read>(source: &mut Window<R>) -> io::Result<Option<bool>> {
     /// The parts of a chunk before its records, uncompressed as ours are.
-    const BEFORE: usize = HEAD + 40;
+    const BEFORE: usize = RECORD_HEADER + 40;
     let start = source.peek(BEFORE)?;
     let number = |at: usize| start.get(at..at + 8).and_then(|b| header(&[&[0], b].concat())).map(|(_, n)| n);
     let (Some((kind::CHUNK, length)), Some(uncompressed), Some(records)) =
-        (header(start), number(HEAD + 16), number(HEAD + 32))
+        (header(start), number(RECORD_HEADER + 16), number(RECORD_HEADER + 32))
     else {
         return Ok(None);
     };
     if length > LARGEST || length != records.saturating_add(40) || uncompressed != records {
         return Ok(None);
     }
-    let whole = HEAD + length as usize;
+    let whole = RECORD_HEADER + length as usize;
     let bytes = source.peek(whole)?;
-    Ok(Some(bytes.len() == whole && Chunk::parse(&bytes[HEAD..]).is_some_and(|c| c.intact() == Some(true))))
+    Ok(Some(
+        bytes.len() == whole
+            && Chunk::parse(&bytes[RECORD_HEADER..]).is_some_and(|c| c.intact() == Some(true)),
+    ))
 }
 
 /// Messages in a damaged chunk at this position, as far as their lengths lead.
 fn countable<R: Read>(source: &mut Window<R>) -> io::Result<u64> {
-    const BEFORE: usize = HEAD + 40;
-    let Some((kind::CHUNK, length)) = header(source.peek(HEAD)?) else { return Ok(0) };
-    let bytes = source.peek(HEAD + length.min(LARGEST) as usize)?;
+    const BEFORE: usize = RECORD_HEADER + 40;
+    let Some((kind::CHUNK, length)) = header(source.peek(RECORD_HEADER)?) else { return Ok(0) };
+    let bytes = source.peek(RECORD_HEADER + length.min(LARGEST) as usize)?;
     let mut rest = bytes.get(BEFORE..).unwrap_or_default();
     let mut count = 0;
     while let Some((kind, length)) = header(rest) {
-        let body = rest.get(HEAD..).and_then(|r| r.get(..usize::try_from(length).ok()?));
+        let body = rest.get(RECORD_HEADER..).and_then(|r| r.get(..usize::try_from(length).ok()?));
         let (kind::SCHEMA..=kind::MESSAGE, Some(body)) = (kind, body) else { break };
         count += u64::from(kind == kind::MESSAGE);
-        rest = &rest[HEAD + body.len()..];
+        rest = &rest[RECORD_HEADER + body.len()..];
     }
     Ok(count)
 }

@@ -1,7 +1,7 @@
 //! A muscle with and without memory.
 
+use super::super::additional_effect::AdditionalEffect;
 use super::super::answer::FindingKind;
-use super::super::beside::Needed;
 use super::super::{History, found, history};
 use crate::linear::Random;
 use model_core::braid::Geometry;
@@ -175,7 +175,7 @@ fn dry_friction_alone_is_no_memory() {
 }
 
 /// The friction that is named beside the memory.
-fn friction(campaign: &Campaign) -> Option<Needed> {
+fn friction(campaign: &Campaign) -> Option<AdditionalEffect> {
     found(campaign, &geometry()).expect("a campaign of staircases").needed
 }
 

@@ -244,8 +244,8 @@ impl Joint {
         let (prepared, _) = rows::prepare(&both, braid)?;
         // On a ramp of pressure at a held length friction turns by a share of its own: no state of the strokes is like it.
         let ramps = prepared.on_ramp.iter().filter(|r| **r).count() as f64 / prepared.len().max(1) as f64;
-        let turned = rests::turned(&prepared);
-        let joint = prepared.without(|i| prepared.on_ramp[i] || turned[i]);
+        let reversed = rests::reversed(&prepared);
+        let joint = prepared.without(|i| prepared.on_ramp[i] || reversed[i]);
         let first_recording = (joint.names.len() - own.names.len().min(joint.names.len())) as u32;
         let first_after = joint.recording.iter().position(|r| *r >= first_recording).unwrap_or(joint.len());
         let reference_rows = joint.without(|i| i >= first_after);

@@ -12,7 +12,7 @@ use pam_data::statistics::{deviation_from_median, median};
 
 /// Rows at rest whose direction the pressure has turned since the muscle moved. The drift of a regulator turns it by chance, in one campaign and
 /// not in the other, while friction does not follow before the pressure has driven the braid through twice its friction.
-pub(super) fn turned(rows: &Rows) -> Vec<bool> {
+pub(super) fn reversed(rows: &Rows) -> Vec<bool> {
     let (mut recording, mut way) = (None, 0.0);
     let one = |i: usize| {
         if recording != Some(rows.recording[i]) {

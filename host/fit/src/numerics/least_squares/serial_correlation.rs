@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use pam_data::statistics::median;
 
-/// Rows from which τ is estimated, at most; more are thinned out.
+/// Rows from which τ is estimated, at most; more are downsampled.
 const ROWS: usize = 1500;
 /// Width of a bin of time differences, in sampling intervals.
 const BIN: f64 = 5.0;

@@ -1,7 +1,7 @@
 //! The texts of the page.
 
-/// Head of the tables of changes.
-pub(super) const HEAD: &str = "| | n | class right | exact | in the set | names in the set | size within 20 % | in the stated 95 % | missed (\"none\") | a name of a false class |\n\
+/// Header of the tables of changes.
+pub(super) const TABLE_HEADER: &str = "| | n | class right | exact | in the set | names in the set | size within 20 % | in the stated 95 % | missed (\"none\") | a name of a false class |\n\
                     | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
 /// Beginning of the page.
@@ -18,12 +18,12 @@ pub(super) const INJECTED: &str = "## Changes added to later runs\n\nIn each mus
     earlier runs are unchanged. All splits with at least two runs on each side (2021), and both splits of three runs (2022, one run on one \
     side). \"Class\", \"exact\": the most probable cause. Sizes: of those named exactly. Rates with exact 95 % intervals.\n";
 
-/// The section on pairs without a change, and the head of its table.
+/// The section on pairs without a change, and the header of its table.
 pub(super) const UNCHANGED: &str = "## Unchanged pairs\n\nEvery contiguous window of runs, split once. Windows of one muscle share runs: errors are \
     clustered, so the intervals are too narrow. \"Change probable\": probability of no change below one half.\n\n\
     | | pairs | named | change probable |\n";
 
-/// The section on a simpler method, and the head of its table.
+/// The section on a simpler method, and the header of its table.
 pub(super) const COMPARISON: &str = "## Comparison with a simpler method\n\nThe simpler method names the one effect whose least squares lower the BIC most, \
     by more than ten. It uses differences of mean force by mounting, direction and bin of pressure, with cells taken as independent, and the \
     same slopes by which the changes were added. The last columns count pairs that only one of the methods gets right (McNemar's test).\n\n\
@@ -36,7 +36,7 @@ pub(super) const TABLES: &str = "## Earlier table as the only reference\n\nThe t
     The form of this error was chosen with both halves known, its constants on the development half: these windows are not an independent \
     test.\n\n";
 
-/// The section on the cylinder, and the head of its table.
+/// The section on the cylinder, and the header of its table.
 pub(super) const CYLINDER: &str = "## Cylinder with another seal\n\nOne rig, another seal or bore: another seal has other friction, the larger bore a larger gain. \
     Main class: gain where the bore differs, otherwise friction.\n\n| | pairs | |\n";
 
@@ -68,7 +68,8 @@ mod tests {
 
     #[test]
     fn the_page_in_the_book_has_these_texts() {
-        let texts = [INTRODUCTION, BOUNDS, INJECTED, UNCHANGED, COMPARISON, TABLES, HEAD, CYLINDER, UNTESTED];
+        let texts =
+            [INTRODUCTION, BOUNDS, INJECTED, UNCHANGED, COMPARISON, TABLES, TABLE_HEADER, CYLINDER, UNTESTED];
         crate::book::contains("proof-reference.md", &texts);
     }
 }

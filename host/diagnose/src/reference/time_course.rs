@@ -21,7 +21,7 @@ pub(super) enum Kind {
     Ramp,
 }
 
-/// What a change does while it is there in full, per unit of size, and the courses that it may take; zero on BEFORE.
+/// What a change does while it is there in full, per unit of size, and the time courses that it may take; zero on BEFORE.
 pub(super) struct Candidate {
     pub shape: DVector<f64>,
     pub kinds: &'static [Kind],
@@ -35,33 +35,33 @@ pub(super) struct Start {
     pub high: f64,
 }
 
-/// The course that explains the difference best.
+/// The time course that explains the difference best.
 #[derive(Debug, Clone)]
-pub(super) struct Course {
+pub(super) struct TimeCourse {
     pub kind: Kind,
-    /// Whether it leads the other courses.
+    /// Whether it leads the other time courses.
     pub sure: bool,
     pub start: Start,
-    /// The shape with this course.
+    /// The shape with this time course.
     pub shape: DVector<f64>,
-    /// Log evidence over all courses and their starts.
+    /// Log evidence over all time courses and their starts.
     pub log: f64,
 }
 
-impl Course {
+impl TimeCourse {
     /// The part of the change that is there at a moment.
     pub fn at(&self, clock: f64) -> f64 {
         factor(self.kind, self.start.at, clock)
     }
 }
 
-/// A course from one start.
+/// A time course from one start.
 struct Tried {
     start: f64,
     log: f64,
 }
 
-/// A change with the courses that its name allows: an offset of the stroke that comes suddenly is a slip, a zero that grows is a drift.
+/// A change with the time courses that its name allows: an offset of the stroke that comes suddenly is a slip, a zero that grows is a drift.
 /// `None` for a change that settled cells do not show by a shape.
 pub(super) fn candidate(cells: &[Cell], change: Change) -> Option<Candidate> {
     let on = |value: &dyn Fn(&Cell) -> Option<f64>| {
@@ -96,12 +96,12 @@ fn factor(kind: Kind, start: f64, clock: f64) -> f64 {
     }
 }
 
-fn with_course(cells: &[Cell], shape: &DVector<f64>, kind: Kind, start: f64) -> DVector<f64> {
+fn with_time_course(cells: &[Cell], shape: &DVector<f64>, kind: Kind, start: f64) -> DVector<f64> {
     let of = |(c, s): (&Cell, &f64)| s * factor(kind, start, c.means.clock);
     DVector::from_iterator(cells.len(), cells.iter().zip(shape.iter()).map(of))
 }
 
-/// `s'Πs`, `s'Πy` and `s's` of a shape with a course.
+/// `s'Πs`, `s'Πy` and `s's` of a shape with a time course.
 type Products = (f64, f64, f64);
 
 /// Sums over the latest cells, by powers of the clock: over pairs of cells, over cells with the difference, and over squares of the shape.
@@ -177,14 +177,14 @@ fn over_starts(kind: Kind, tried: &[Tried]) -> f64 {
     }
 }
 
-/// How a change develops; `None` where the cells do not show it by any of its courses.
+/// How a change develops; `None` where the cells do not show it by any of its time courses.
 pub(super) fn of(
     cells: &[Cell],
     contrast: &Contrast,
     candidate: &Candidate,
     scale: f64,
     sizes: &[f64],
-) -> Option<Course> {
+) -> Option<TimeCourse> {
     let Candidate { shape, kinds } = candidate;
     let all = products(cells, contrast, shape);
     let tried = |from: &[(f64, Products)]| -> Vec<Tried> {
@@ -194,7 +194,7 @@ pub(super) fn of(
         };
         from.iter().map(|(start, products)| Tried { start: *start, log: log(*products) }).collect()
     };
-    let mut courses: Vec<(Kind, f64, Vec<Tried>)> = Vec::new();
+    let mut time_courses: Vec<(Kind, f64, Vec<Tried>)> = Vec::new();
     for kind in *kinds {
         let tried = match kind {
             Kind::Whole => tried(&[(0.0, all.whole)]),
@@ -209,16 +209,16 @@ pub(super) fn of(
         };
         let log = prior.ln() + over_starts(*kind, &tried);
         if log.is_finite() {
-            courses.push((*kind, log, tried));
+            time_courses.push((*kind, log, tried));
         }
     }
-    let log = log_sum(&courses.iter().map(|c| c.1).collect::<Vec<f64>>());
-    courses.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let second = courses.get(1).map_or(f64::NEG_INFINITY, |c| c.1);
-    let (kind, best, tried) = courses.into_iter().next()?;
+    let log = log_sum(&time_courses.iter().map(|c| c.1).collect::<Vec<f64>>());
+    time_courses.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let second = time_courses.get(1).map_or(f64::NEG_INFINITY, |c| c.1);
+    let (kind, best, tried) = time_courses.into_iter().next()?;
     let start = start(&tried)?;
-    let shape = with_course(cells, shape, kind, start.at);
-    (rms_after(cells, &shape) > 0.0).then_some(Course {
+    let shape = with_time_course(cells, shape, kind, start.at);
+    (rms_after(cells, &shape) > 0.0).then_some(TimeCourse {
         kind,
         sure: best > second + COURSE_LEAD,
         start,
@@ -282,7 +282,7 @@ mod tests {
         each.extend(all.ramps.iter().map(|(t, p)| (Kind::Ramp, *t, *p)));
         assert_eq!(each.len(), 1 + 7 + 8);
         for (kind, start, (a, b, square)) in each {
-            let direct = with_course(&cells, &shape, kind, start);
+            let direct = with_time_course(&cells, &shape, kind, start);
             let (direct_a, direct_b) = contrast.products(&direct);
             assert!((a - direct_a).abs() < 1e-9, "{kind:?} {start}: {a} {direct_a}");
             assert!((b - direct_b).abs() < 1e-9, "{kind:?} {start}: {b} {direct_b}");
@@ -293,12 +293,12 @@ mod tests {
     #[test]
     fn a_step_is_found_between_the_cells_beside_it() {
         let (cells, contrast, shape) = example();
-        let stepped = with_course(&cells, &shape, Kind::Step, 0.5) * 30.0;
+        let stepped = with_time_course(&cells, &shape, Kind::Step, 0.5) * 30.0;
         let contrast = contrast.with_residual(&contrast.residual + stepped);
         let candidate = Candidate { shape, kinds: &[Kind::Whole, Kind::Step, Kind::Ramp] };
-        let course = of(&cells, &contrast, &candidate, 1.0, &[10.0, 30.0]).expect("a course");
-        assert_eq!((course.kind, course.sure), (Kind::Step, true));
-        assert!((course.start.at - 0.5).abs() < 1e-9, "{:?}", course.start);
-        assert!(course.start.low < 0.5 && course.start.high > 0.5, "{:?}", course.start);
+        let time_course = of(&cells, &contrast, &candidate, 1.0, &[10.0, 30.0]).expect("a time course");
+        assert_eq!((time_course.kind, time_course.sure), (Kind::Step, true));
+        assert!((time_course.start.at - 0.5).abs() < 1e-9, "{:?}", time_course.start);
+        assert!(time_course.start.low < 0.5 && time_course.start.high > 0.5, "{:?}", time_course.start);
     }
 }

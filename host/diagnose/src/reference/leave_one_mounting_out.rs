@@ -8,7 +8,7 @@ use super::criteria::{GATE, GATE_MOUNTINGS, GATE_WORTH_ASKING};
 use super::shapes::Change;
 
 /// A named change with its evidence over none.
-pub(super) struct GatedChange<'a> {
+pub(super) struct WeighedChange<'a> {
     pub change: Change,
     /// Normalised to unit rms over AFTER.
     pub shape: &'a DVector<f64>,
@@ -19,7 +19,7 @@ pub(super) struct GatedChange<'a> {
 }
 
 /// Limits the log evidences. With fewer than three mountings there is no limit.
-pub(super) fn limit(cells: &[Cell], contrast: &Contrast, changes: &mut [GatedChange<'_>], sizes: &[f64]) {
+pub(super) fn limit(cells: &[Cell], contrast: &Contrast, changes: &mut [WeighedChange<'_>], sizes: &[f64]) {
     let mut mountings: Vec<usize> = cells.iter().filter(|c| c.after).map(|c| c.mounting).collect();
     mountings.sort_unstable();
     mountings.dedup();
@@ -44,10 +44,10 @@ pub(super) fn limit(cells: &[Cell], contrast: &Contrast, changes: &mut [GatedCha
     let strong = GATE.ln();
     let best = candidates.iter().map(|i| worst[*i]).fold(f64::NEG_INFINITY, f64::max);
     for &i in &candidates {
-        // The gate tests the presence of a change of this kind: it closes for every name or for none. Only what begins within AFTER
+        // This tests the presence of a change of this kind: it limits every name or none. Only what begins within AFTER
         // may lie at its end, where one mounting shows it.
-        let closed = best < strong || (changes[i].begins && worst[i] < strong);
-        if closed {
+        let limited = best < strong || (changes[i].begins && worst[i] < strong);
+        if limited {
             changes[i].log = changes[i].log.min(worst[i]);
         }
     }

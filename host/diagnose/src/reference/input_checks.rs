@@ -23,7 +23,7 @@ fn moving(r: &Recording) -> BTreeSet<[u64; 3]> {
 ///
 /// # Errors
 /// [`DataCode::CallInvalid`] with both names.
-pub(super) fn apart(before: &Campaign, after: &Campaign) -> Result<()> {
+pub(super) fn refuse_shared_rows(before: &Campaign, after: &Campaign) -> Result<()> {
     let known: Vec<(&Recording, BTreeSet<[u64; 3]>)> =
         before.recordings.iter().map(|b| (b, moving(b))).collect();
     for a in &after.recordings {
@@ -93,7 +93,7 @@ fn dates(campaign: &Campaign) -> impl Iterator<Item = f64> + Clone {
 }
 
 /// Says so where every dated recording of the reference is later than every one of AFTER.
-pub(super) fn order(before: &Campaign, after: &Campaign) -> Option<Remark> {
+pub(super) fn order_remark(before: &Campaign, after: &Campaign) -> Option<Remark> {
     let first = dates(before).fold(f64::INFINITY, f64::min);
     let last = dates(after).fold(f64::NEG_INFINITY, f64::max);
     (first.is_finite() && last.is_finite() && first > last)
@@ -121,8 +121,8 @@ mod tests {
     #[test]
     fn parts_of_one_recording_may_not_overlap() {
         let (first, second) = (recording("a.csv", 0, 100), recording("b.csv", 100, 200));
-        assert!(apart(&first, &second).is_ok());
-        let error = apart(&first, &recording("b.csv", 60, 160)).expect_err("rows are in both");
+        assert!(refuse_shared_rows(&first, &second).is_ok());
+        let error = refuse_shared_rows(&first, &recording("b.csv", 60, 160)).expect_err("rows are in both");
         // Of 40 common rows the first has none before it to have moved from.
         assert!(error.cause().contains("overlap: 39 rows"), "{error}");
     }
@@ -143,8 +143,8 @@ mod tests {
     #[test]
     fn a_reference_of_a_later_day_is_reported() {
         let (march, may) = (recording("2026-03-01.csv", 0, 9), recording("2026-05-01.csv", 9, 18));
-        assert!(matches!(order(&may, &march), Some(Remark::ReferenceLater { .. })));
-        assert_eq!(order(&march, &may), None);
-        assert_eq!(order(&recording("x.csv", 0, 9), &march), None);
+        assert!(matches!(order_remark(&may, &march), Some(Remark::ReferenceLater { .. })));
+        assert_eq!(order_remark(&march, &may), None);
+        assert_eq!(order_remark(&recording("x.csv", 0, 9), &march), None);
     }
 }

@@ -81,7 +81,7 @@ impl Sweep {
         self.points += 1;
     }
 
-    fn say(&self, name: &str) {
+    fn print(&self, name: &str) {
         hprintln!("{} {:.1} {:.1} {}", name, self.sum / self.points.max(1) as f32, self.worst, self.points);
     }
 }
@@ -174,9 +174,9 @@ fn functions(table: &MuscleTable, muscle: &Muscle<f32>) {
             direct.add(instructions(16, (p, x, s), |(p, x, s)| direct_force_of(port, table, p, x, s)));
         }
     });
-    force.say("force");
-    inverse.say("inverse");
-    direct.say("direct-port");
+    force.print("force");
+    inverse.print("inverse");
+    direct.print("direct-port");
 }
 
 /// The whole 1 kHz step in force control: muscle moving, wave of force, telemetry at every tenth tick. The load cell is compared with
@@ -243,7 +243,7 @@ fn steps(table: &MuscleTable) {
     let controller = CONTROLLER.init_with(|| Controller::new(&Settings::default()));
     let Some(with) = whole_step(controller, table, true) else { return };
     let Some(without) = whole_step(controller, table, false) else { return };
-    with.say("step");
+    with.print("step");
     let mean = |sweep: &Sweep| sweep.sum / sweep.points.max(1) as f32;
     // The countdown to a sample runs in both.
     let mut idle = Health::default();
@@ -296,7 +296,7 @@ fn effects(table: &MuscleTable) {
         context.add(once - (twice - once) - bare);
         hprintln!("effect:{} {:.1} {:.1} 64", effect.info().name, twice - once, twice - once);
     }
-    context.say("context-of-effects");
+    context.print("context-of-effects");
 }
 
 #[entry]

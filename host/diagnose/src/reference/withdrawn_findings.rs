@@ -1,4 +1,4 @@
-//! Names that are withdrawn: the difference is that of another actuator, or the named changes make held-out recordings worse.
+//! Findings that are withdrawn: the difference is that of another actuator, or the named changes make held-out recordings worse.
 
 use super::answer::{ChangeReport, Considered, Left, Remark, Split, Verdict, WhyNot};
 use super::criteria::{LEFT_BY_NAMES, OTHER_ACTUATOR, UNSEEN_LEAST};

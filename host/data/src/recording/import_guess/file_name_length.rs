@@ -2,7 +2,7 @@
 
 use regex_lite::Regex;
 
-use super::named_pressure::{GAP, NUMBER};
+use super::constant_pressure::{GAP, NUMBER};
 use super::others::Others;
 use super::{Guess, GuessedPattern};
 use crate::recording::{Quantity, decimal};

@@ -2,7 +2,7 @@
 
 use model_core::braid::{Braid, Geometry};
 
-use super::beside::Needed;
+use super::additional_effect::AdditionalEffect;
 use super::criteria::{ENTER_EXPLAINED, ENTER_RESOLVED, MOST_LOST};
 use super::entries::is_from_history;
 use super::slack_reading::SlackReading;
@@ -160,8 +160,8 @@ fn enter(diagnosis: &mut Diagnosis, found: Found) {
 
 /// An effect that unseen runs need, where the search has not named it or one that it is not distinguished from. `left` is the share of the
 /// squared error that the memory leaves.
-fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&Needed>, left: f64) {
-    let known = |n: &Needed| {
+fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&AdditionalEffect>, left: f64) {
+    let known = |n: &AdditionalEffect| {
         let is_it = |effect: &str| effect == n.effect.info().name;
         diagnosis.missing.iter().any(|m| is_it(&m.effect) || m.confusable_with.iter().any(|c| is_it(c)))
     };

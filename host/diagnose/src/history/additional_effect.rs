@@ -30,7 +30,7 @@ pub(super) struct Column {
 
 /// An effect that unseen runs need beside the memory.
 #[derive(Clone, Debug)]
-pub(super) struct Needed {
+pub(super) struct AdditionalEffect {
     pub effect: Candidate,
     /// Which of its amplitudes.
     pub amplitude: usize,
@@ -139,7 +139,7 @@ pub(super) fn needed(
     base: &[Vec<f64>],
     columns: &[Column],
     areas: &[f64],
-) -> Option<Needed> {
+) -> Option<AdditionalEffect> {
     let points = layer.points;
     let mut without = vec![measured(points, law.clone(), memory.clone())];
     without.extend(base.iter().map(|column| tried(layer, law, steps, &[column])));
@@ -168,7 +168,7 @@ pub(super) fn needed(
     let fitted: Vec<Vec<f64>> = steps.iter().cloned().chain(friction).chain([column.shift.clone()]).collect();
     let (alone, _) = unseen::shifted_curves(layer, &fitted, &found.law.fit.theta[1..]);
     let force = |i: usize| (column.shift[i] * areas[points.mounting[i]] * value).abs();
-    Some(Needed {
+    Some(AdditionalEffect {
         effect: column.effect,
         amplitude: column.amplitude,
         shape: column.shape,

@@ -1,4 +1,4 @@
-//! The gap between filling and emptying as a finding: how large it is, what explains it, and what does not.
+//! Hysteresis as a finding: how large the gap between filling and emptying is, what explains it, and what does not.
 
 use model_core::effects::EffectName;
 

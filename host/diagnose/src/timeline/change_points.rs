@@ -48,7 +48,7 @@ pub struct Change {
 
 /// What became of a series.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Course {
+pub struct ChangePoints {
     /// Its changes, in the order of time.
     pub changes: Vec<Change>,
     /// Probability that nothing (more) changed.
@@ -169,26 +169,26 @@ fn evidence(x: &[f64], residual: &[f64], freedom: f64, worth: f64) -> f64 {
 
 /// Looks for the changes of a series.
 #[must_use]
-pub(crate) fn find(dates: &[f64], series: &Series) -> Course {
+pub(crate) fn find(dates: &[f64], series: &Series) -> ChangePoints {
     let known = Known::of(dates, series);
     let n = known.value.len();
     if n < FEWEST_POINTS {
-        return Course { none: COURSE_PRIOR_NONE, too_few: true, ..Course::default() };
+        return ChangePoints { none: COURSE_PRIOR_NONE, too_few: true, ..ChangePoints::default() };
     }
     // Equal values have no error and no change.
     if !known.error.iter().all(|e| *e > 0.0) {
-        return Course { none: 1.0, ..Course::default() };
+        return ChangePoints { none: 1.0, ..ChangePoints::default() };
     }
     let y = known.weighted(&known.value);
     let mut basis = Basis::default();
     basis.add(&known.weighted(&vec![1.0; n]));
-    let mut course = Course { none: 1.0, ..Course::default() };
+    let mut change_points = ChangePoints { none: 1.0, ..ChangePoints::default() };
     let mut shapes: Vec<(Vec<f64>, Change)> = Vec::new();
     while shapes.len() < COURSE_MOST_CHANGES && n > shapes.len() + 2 {
         let residual = basis.rest(&y);
         let freedom = (n - 1 - shapes.len()) as f64;
         let Some(next) = Candidate::best(&known, &basis, &residual, freedom) else { break };
-        course.none = next.none;
+        change_points.none = next.none;
         if !(1.0 - next.none >= COURSE_CHANGED) {
             break;
         }
@@ -201,7 +201,7 @@ pub(crate) fn find(dates: &[f64], series: &Series) -> Course {
     let left = basis.rest(&y);
     let freedom = n as f64 - basis.0.len() as f64;
     let scale = (known.worth + dot(&left, &left)) / (known.worth + freedom);
-    course.scatter = (freedom >= 1.0).then(|| (dot(&left, &left) / freedom).sqrt());
+    change_points.scatter = (freedom >= 1.0).then(|| (dot(&left, &left) / freedom).sqrt());
     for i in 0..shapes.len() {
         let mut others = Basis::default();
         others.add(&known.weighted(&vec![1.0; n]));
@@ -211,9 +211,9 @@ pub(crate) fn find(dates: &[f64], series: &Series) -> Course {
         let change = &mut shapes[i].1;
         (change.size, change.std) = (dot(&own, &y) / a, (scale / a).sqrt());
     }
-    course.changes = shapes.into_iter().map(|s| s.1).collect();
-    course.changes.sort_by_key(|c| (c.from, c.to));
-    course
+    change_points.changes = shapes.into_iter().map(|s| s.1).collect();
+    change_points.changes.sort_by_key(|c| (c.from, c.to));
+    change_points
 }
 
 /// What can happen next.

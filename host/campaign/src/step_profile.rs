@@ -1,6 +1,6 @@
 //! The setpoint profile of a step: pressure and stroke over time, in SI units.
 
-/// One stretch of a course.
+/// One stretch of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Segment {
     /// The free end moves at constant speed.
@@ -33,7 +33,7 @@ pub enum Segment {
 
 /// The segments of a step, and which of them are recorded. It begins and ends vented at rest length.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Course {
+pub struct StepProfile {
     /// Segments, and whether each is recorded.
     pub segments: Vec<(Segment, bool)>,
 }
@@ -41,7 +41,7 @@ pub struct Course {
 /// Time in which a muscle vents, s.
 pub(crate) const VENT_S: f64 = 2.0;
 
-impl Course {
+impl StepProfile {
     /// Adds a segment that is recorded.
     pub fn record(&mut self, segment: Segment) {
         self.segments.push((segment, true));
@@ -115,14 +115,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_course_takes_as_long_as_its_segments_and_records_what_it_should() {
-        let mut course = Course::default();
-        course.skip(Segment::Ramp { to: 2e5, rate: 1e5 });
-        course.record(Segment::Travel { to: 2e-3, speed: 1e-3, until_force: None });
-        course.record(Segment::Travel { to: 0.0, speed: 1e-3, until_force: None });
-        course.skip(Segment::Vented { seconds: VENT_S });
-        assert!((course.seconds() - 8.0).abs() < 1e-9);
-        let (time, pressure, stroke) = course.samples(100.0, 10.0);
+    fn a_profile_takes_as_long_as_its_segments_and_records_what_it_should() {
+        let mut profile = StepProfile::default();
+        profile.skip(Segment::Ramp { to: 2e5, rate: 1e5 });
+        profile.record(Segment::Travel { to: 2e-3, speed: 1e-3, until_force: None });
+        profile.record(Segment::Travel { to: 0.0, speed: 1e-3, until_force: None });
+        profile.skip(Segment::Vented { seconds: VENT_S });
+        assert!((profile.seconds() - 8.0).abs() < 1e-9);
+        let (time, pressure, stroke) = profile.samples(100.0, 10.0);
         assert_eq!((time.len(), pressure[0], stroke[19]), (40, 2e5, 2e-3));
         assert!((time[0] - 102.1).abs() < 1e-9);
     }

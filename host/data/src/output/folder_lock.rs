@@ -16,11 +16,11 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// While this lives, other runs of this program write no results into the same folders: the table, the report and the JSON that
 /// exist afterwards are those of one run.
 #[derive(Debug)]
-pub struct Turn {
+pub struct FolderLock {
     _locked: Vec<File>,
 }
 
-impl Turn {
+impl FolderLock {
     /// Waits for the folders of these files. One that cannot be locked, as on some network drives, is not waited for.
     ///
     /// # Errors
@@ -77,16 +77,16 @@ fn held(folder: &Path, holder: Option<u32>, patience: Duration) -> Error {
         .file(folder)
     };
     match holder {
-        Some(id) if is_stopped(id) => error(format!("{}, which is stopped,", named(id))).help(format!(
+        Some(id) if is_stopped(id) => error(format!("{}, which is stopped,", process_description(id))).help(format!(
             "continue it with `kill -CONT {id}` or end it with `kill -KILL {id}`; or write to another folder"
         )),
-        Some(id) => error(named(id))
+        Some(id) => error(process_description(id))
             .help(format!("wait for it or end it with `kill {id}`; or write to another folder")),
         None => error("another program".into()).help("end it or wait for it; or write to another folder"),
     }
 }
 
-fn named(id: u32) -> String {
+fn process_description(id: u32) -> String {
     match fs::read_to_string(format!("/proc/{id}/comm")) {
         Ok(name) => format!("the program {} (process {id})", name.trim_end().escape_debug()),
         Err(_) => format!("process {id}"),
@@ -134,8 +134,8 @@ mod tests {
                 scope.spawn(move || {
                     for round in 0..20 {
                         let text = format!("{run} {round}");
-                        let _turn =
-                            Turn::of([Some(table.as_path()), None, Some(report.as_path())]).expect("a turn");
+                        let _guard = FolderLock::of([Some(table.as_path()), None, Some(report.as_path())])
+                            .expect("a lock");
                         write_whole(&table, text.as_bytes()).expect("written");
                         write_whole(&report, text.as_bytes()).expect("written");
                         let read = |p: &Path| fs::read(p).expect("readable");
@@ -151,13 +151,13 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let result = folder.path().join("result");
         let patience = Duration::from_millis(30);
-        let first = Turn::within([Some(result.as_path())], patience).expect("a turn");
-        let error = Turn::within([Some(result.as_path())], patience).expect_err("it is held");
+        let first = FolderLock::within([Some(result.as_path())], patience).expect("a lock");
+        let error = FolderLock::within([Some(result.as_path())], patience).expect_err("it is held");
         assert_eq!((error.code().name(), error.exit_status()), ("file::unwritable", 1));
         #[cfg(target_os = "linux")]
         assert!(error.to_string().contains(&format!("process {}", std::process::id())), "{error}");
         drop(first);
-        Turn::within([Some(result.as_path())], patience).expect("a turn");
+        FolderLock::within([Some(result.as_path())], patience).expect("a lock");
     }
 
     #[cfg(target_os = "linux")]

@@ -1,8 +1,8 @@
-//! What happened to the named effects when the table was refitted.
+//! How the refitted table predicts with and without the named effects, and which one was written.
 
 /// The table with the named effects predicts the recordings no better than without.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reserve {
+pub struct RefitComparison {
     /// Whether it was written with them all the same, because the user gave them.
     pub kept: bool,
     /// Root mean square error on these recordings with the effects, N.

@@ -22,7 +22,7 @@ const NOMINAL: f64 = 0.05;
 /// Words of pressures that are not the muscle's, or that count from elsewhere.
 const OTHERS: &str = "supply|source|line|tank|atmosph|ambient|barometric|abs|max|min|limit|burst|versorg|speise|netzdruck|luftdruck|umgebung|alimentation";
 /// Words before a number that count recordings, beside those of columns that set runs apart.
-const COUNTED: &[&str] = &["r", "n", "no", "nr", "rep", "loop", "cycle", "zyklus", "m", "v"];
+const NUMBERING: &[&str] = &["r", "n", "no", "nr", "rep", "loop", "cycle", "zyklus", "m", "v"];
 
 /// What was found in one place.
 enum Found {
@@ -34,10 +34,10 @@ enum Found {
 
 /// Takes the pressure from the lines above the table or from the names of the files.
 pub(super) fn find(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
-    let named = sample.columns.iter().filter(|c| !c.name.is_raw());
-    let mut named = named.filter_map(SampleColumn::named_for);
+    let columns = sample.columns.iter().filter(|c| !c.name.is_raw());
+    let mut quantities = columns.filter_map(SampleColumn::quantity_by_name);
     // A column of pressure that cannot be read is a mistake in the file, and no reason to look elsewhere.
-    if guess.has(Quantity::Pressure) || named.any(|quantity| quantity == Quantity::Pressure) {
+    if guess.has(Quantity::Pressure) || quantities.any(|quantity| quantity == Quantity::Pressure) {
         return;
     }
     let names: Vec<String> = std::iter::once(guess.file.clone()).chain(others.names()).collect();
@@ -231,19 +231,19 @@ fn mentions(name: &str, unit: &str) -> Vec<Mention> {
 fn spelled(before: &str, fraction: &str) -> Option<Spelled> {
     let sign = before.chars().next_back().filter(|c| "p_-".contains(*c))?;
     let rest = &before[..before.len() - 1];
-    let head = rest.trim_end_matches(|c: char| c.is_ascii_digit());
-    let whole = &rest[head.len()..];
+    let prefix = rest.trim_end_matches(|c: char| c.is_ascii_digit());
+    let whole = &rest[prefix.len()..];
     let counts = whole.len() > 1 && whole.starts_with('0');
     if whole.is_empty() || counts || !fraction.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let bare = head.trim_end_matches(['_', '-', '.', ' ']);
-    if bare.len() < head.len() && bare.ends_with(|c: char| c.is_ascii_digit()) {
+    let bare = prefix.trim_end_matches(['_', '-', '.', ' ']);
+    if bare.len() < prefix.len() && bare.ends_with(|c: char| c.is_ascii_digit()) {
         return None;
     }
     let word = bare[bare.trim_end_matches(char::is_alphabetic).len()..].to_lowercase();
-    let counted = RUNS.contains(&word.as_str()) || COUNTED.contains(&word.as_str());
+    let is_numbering = RUNS.contains(&word.as_str()) || NUMBERING.contains(&word.as_str());
     // `05bar` is written for no pressure of 5 bar.
-    let counts = counted && !(fraction.len() > 1 && fraction.starts_with('0'));
+    let counts = is_numbering && !(fraction.len() > 1 && fraction.starts_with('0'));
     Some(Spelled { value: format!("{whole}.{fraction}").parse().ok()?, sign, counts })
 }

@@ -133,9 +133,9 @@ impl Track<'_> {
     /// The first sample that belongs to `after`, where `before` turns into `after` without a rest.
     ///
     /// Where single samples stand clear of the noise, the extremum's own sample is the only one in doubt: on a corner it lies
-    /// on the line of one side, on a smooth turn the slope across it decides. Where they do not, the lines of both sides,
-    /// taken at equal distances from the turn, meet there.
-    pub(super) fn turn(&self, before: &Leg, after: &Leg) -> usize {
+    /// on the line of one side, on a smooth reversal the slope across it decides. Where they do not, the lines of both sides,
+    /// taken at equal distances from the reversal, meet there.
+    pub(super) fn reversal(&self, before: &Leg, after: &Leg) -> usize {
         let k = after.start;
         let (first, last) = (before.start, after.end);
         let steps =
@@ -144,7 +144,7 @@ impl Track<'_> {
         let right = self.leaves(after, self.threshold);
         let step = steps(left, k).min(steps(k, right));
         if step > SHARP_STEP * self.noise || right - left < SHARP_SAMPLES {
-            return self.sharp_turn(k, first, last, before.sign());
+            return self.sharp_reversal(k, first, last, before.sign());
         }
         // Samples close to the extremum may belong to either side; far ones show little about it.
         let near = self.tolerance();
@@ -160,7 +160,7 @@ impl Track<'_> {
         at.clamp(left + 1, right)
     }
 
-    fn sharp_turn(&self, k: usize, first: usize, last: usize, way: f64) -> usize {
+    fn sharp_reversal(&self, k: usize, first: usize, last: usize, way: f64) -> usize {
         let x = self.raw;
         // The extremum of the recorded column may be beside that of the smoothed one.
         let around = k.saturating_sub(2).max(first)..=(k + 2).min(last);

@@ -15,7 +15,7 @@ pub const SIZES: [f64; 2] = [3.0, 5.0];
 /// How a change continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Course {
+pub enum TimeCourse {
     /// From the first run after on.
     Whole,
     /// Suddenly.
@@ -34,7 +34,8 @@ pub struct Trial {
     /// %.
     pub percent: f64,
     /// How.
-    pub course: Course,
+    #[serde(rename = "course")]
+    pub time_course: TimeCourse,
     /// When, share of AFTER.
     pub start: f64,
     /// Class of the name right: a zero that grows is a drift, an offset of the stroke that comes is a slip.
@@ -69,8 +70,8 @@ fn blended(whole: &[Run], before: &[Run], factor: &dyn Fn(f64) -> f64) -> Vec<Ru
 }
 
 /// Whether a name is right for what was put in.
-fn right(effect: &str, course: Course, name: &str) -> bool {
-    let slip = effect == "displacement-offset" && course != Course::Whole && name == "end-slip";
+fn right(effect: &str, time_course: TimeCourse, name: &str) -> bool {
+    let slip = effect == "displacement-offset" && time_course != TimeCourse::Whole && name == "end-slip";
     slip || class(name) == class(effect)
 }
 
@@ -79,7 +80,7 @@ fn ask(
     slopes: &Slopes,
     effect: &'static str,
     percent: f64,
-    course: Course,
+    time_course: TimeCourse,
 ) -> Result<Trial, String> {
     let middle = (muscle.runs / 2).max(1);
     let before = muscle.between(1, middle);
@@ -87,12 +88,12 @@ fn ask(
     plain.sort_by_key(|r| (r.run, r.mounting));
     let (whole, _) = inject(&plain, effect, percent, slopes, &muscle.name, middle, 0.5);
     // The moment is drawn by a hash, so that no constant can be fitted to it.
-    let hash = Sha256::digest(format!("{}|{effect}|{percent}|{course:?}", muscle.name));
-    let start = if course == Course::Whole { 0.0 } else { 0.25 + 0.5 * f64::from(hash[1]) / 255.0 };
-    let factor = |clock: f64| match course {
-        Course::Whole => 1.0,
-        Course::Step => f64::from(u8::from(clock >= start)),
-        Course::Ramp => ((clock - start) / (1.0 - start)).max(0.0),
+    let hash = Sha256::digest(format!("{}|{effect}|{percent}|{time_course:?}", muscle.name));
+    let start = if time_course == TimeCourse::Whole { 0.0 } else { 0.25 + 0.5 * f64::from(hash[1]) / 255.0 };
+    let factor = |clock: f64| match time_course {
+        TimeCourse::Whole => 1.0,
+        TimeCourse::Step => f64::from(u8::from(clock >= start)),
+        TimeCourse::Ramp => ((clock - start) / (1.0 - start)).max(0.0),
     };
     let after = blended(&whole, &plain, &factor);
     let report = compared(&before, &after).map_err(|e| format!("{} {effect}: {e}", muscle.name))?;
@@ -105,7 +106,7 @@ fn ask(
         }
         elapsed += run.time.last().copied().unwrap_or(0.0);
     }
-    let named = report.missing.iter().find(|m| right(effect, course, &m.effect));
+    let named = report.missing.iter().find(|m| right(effect, time_course, &m.effect));
     let (answer, moment): (&str, Option<&Moment>) = match named.map(|m| &m.since) {
         None => ("no name", None),
         Some(Since::Beginning) => ("beginning", None),
@@ -117,7 +118,7 @@ fn ask(
         muscle: muscle.name.clone(),
         effect,
         percent,
-        course,
+        time_course,
         start,
         right: named.is_some(),
         answer,
@@ -137,11 +138,13 @@ pub fn run(muscles: &[(&Muscle, &Slopes)]) -> Result<Vec<Trial>, String> {
     for (muscle, slopes) in muscles {
         for effect in immediate() {
             for percent in SIZES {
-                for course in [Course::Whole, Course::Step, Course::Ramp] {
-                    jobs.push((*muscle, *slopes, effect, percent, course));
+                for time_course in [TimeCourse::Whole, TimeCourse::Step, TimeCourse::Ramp] {
+                    jobs.push((*muscle, *slopes, effect, percent, time_course));
                 }
             }
         }
     }
-    jobs.par_iter().map(|(m, s, effect, percent, course)| ask(m, s, effect, *percent, *course)).collect()
+    jobs.par_iter()
+        .map(|(m, s, effect, percent, time_course)| ask(m, s, effect, *percent, *time_course))
+        .collect()
 }

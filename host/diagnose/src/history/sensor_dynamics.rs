@@ -1,4 +1,4 @@
-//! Readings that come late, at settled points.
+//! Sensors with dynamics, at settled points: readings that come late.
 //!
 //! | effect | shift of pressure |
 //! | --- | --- |
@@ -8,7 +8,7 @@
 
 use pam_fit::bench::{BenchName, Candidate};
 
-use super::beside::Column;
+use super::additional_effect::Column;
 use super::campaign::Points;
 use super::criteria::FILTER_TIMES;
 
