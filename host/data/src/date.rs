@@ -88,6 +88,7 @@ pub fn time_stamp(text: &str) -> Option<f64> {
 
 /// How dates with slashes are read that do not begin with the year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[allow(clippy::enum_variant_names, reason = "each names the part that stands first")]
 pub(crate) enum DateOrder {
     /// They are not.
     #[default]
