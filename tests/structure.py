@@ -76,6 +76,13 @@ def effects():
     return set(re.findall(r'^\s*name: "([a-z-]+)",$', text, re.M))
 
 
+def one_word(lines):
+    """Documentation of public items that is a single word, or a unit."""
+    for before, first, item in zip([""] + lines, lines, lines[1:]):
+        if not before.lstrip().startswith("///") and re.match(r"\s*/// [\w/²³%]+\.$", first) and re.match(r"\s*pub ", item):
+            yield first
+
+
 def counts(tree):
     """The figures of one tree."""
     folders = folders_of(tree)
@@ -99,6 +106,10 @@ def counts(tree):
         "names of effects as literals in the diagnosis": sum(
             1 for lines in diagnosis.values() for line in lines if not line.lstrip().startswith("//")
             for literal in re.findall(r'"([a-z-]+)"', line) if literal in names),
+        "names of effects as variants in the diagnosis": sum(
+            len(re.findall(r"\b(?:EffectName|BenchName|Change)::[A-Z]", line))
+            for lines in diagnosis.values() for line in lines if not line.lstrip().startswith("//")),
+        "documentation of one word": sum(1 for _, lines in everything for _ in one_word(lines)),
         "constants declared outside the page of criteria, in the diagnosis": sum(
             bool(CONSTANT.match(line)) for path, lines in diagnosis.items() for line in lines if "criteria" not in str(path)),
         "public modules of the fit": count(fit, r"(?m)^\s*pub mod "),

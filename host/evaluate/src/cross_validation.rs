@@ -149,6 +149,31 @@ fn key(recording: &Recording, index: usize, split: Split) -> String {
     }
 }
 
+/// The groups that are left out in turn.
+///
+/// # Errors
+/// Fewer than two groups, or contractions of a muscle that moves.
+fn groups(campaign: &Campaign, keys: &[String], split: Split) -> Result<Vec<String>> {
+    if split == Split::Contraction && campaign.recordings.iter().any(|r| r.held_stroke().is_none()) {
+        return Err(Error::new(
+            FitCode::FitUnderdetermined,
+            "contractions are left out where every recording has a held length, and here the muscle moves",
+        )
+        .help("leave runs out instead"));
+    }
+    let mut values = keys.to_vec();
+    values.sort();
+    values.dedup();
+    if values.len() < 2 {
+        return Err(Error::new(
+            FitCode::FitUnderdetermined,
+            "cross-validation needs at least two groups, and all recordings belong to one",
+        )
+        .help("give several recordings, or an import description that splits the file by run"));
+    }
+    Ok(values)
+}
+
 /// Leaves each run or contraction out in turn, fits the others, and scores the prediction of what was left out.
 ///
 /// # Errors
@@ -161,23 +186,7 @@ pub fn cross_validate(
     published: Option<&Published>,
 ) -> Result<CrossValidation> {
     let keys: Vec<String> = campaign.recordings.iter().enumerate().map(|(i, r)| key(r, i, split)).collect();
-    if split == Split::Contraction && campaign.recordings.iter().any(|r| r.held_stroke().is_none()) {
-        return Err(Error::new(
-            FitCode::FitUnderdetermined,
-            "contractions are left out where every recording has a held length, and here the muscle moves",
-        )
-        .help("leave runs out instead"));
-    }
-    let mut values = keys.clone();
-    values.sort();
-    values.dedup();
-    if values.len() < 2 {
-        return Err(Error::new(
-            FitCode::FitUnderdetermined,
-            "cross-validation needs at least two groups, and all recordings belong to one",
-        )
-        .help("give several recordings, or an import description that splits the file by run"));
-    }
+    let values = groups(campaign, &keys, split)?;
     let whole = fit(campaign, muscle, options)?;
     let clip = whole.solution.problem.clips.0.map(|c| c.force);
     let blocked = f64::from(whole.table.blocked_force.newtons());

@@ -53,17 +53,8 @@ pub fn remark(remark: &Remark) -> String {
         Remark::Spikes { excluded, total } => {
             format!("{excluded} of {total} force readings excluded: isolated outliers")
         }
-        Remark::InverseFriction { constant, slope } => format!(
-            "k_F(P) follows {constant:.3} + {:.1} kPa/P: this friction is not proportional to force (dry, seal, or viscous at \
-             one speed)",
-            slope * 1e-3
-        ),
-        Remark::StraightElasticity(change) => format!(
-            "E_1 {} linearly with pressure, by {:.0} % over the range. One bladder cannot do this; possible causes: ends that are \
-             not cylindrical, a stretching braid, a gain error, or a slow change in the order of the tests",
-            if *change > 0.0 { "rises" } else { "falls" },
-            100.0 * change.abs()
-        ),
+        Remark::InverseFriction { constant, slope } => inverse_friction(*constant, *slope),
+        Remark::StraightElasticity(change) => straight_elasticity(*change),
         Remark::CoarseStroke { step, force } => format!(
             "the displacement is read in steps of {:.2} mm, an error of up to {force:.2} N rms in the model's force: smaller errors of the \
              model are hardly visible. Use a displacement sensor of finer resolution",
@@ -140,6 +131,23 @@ fn friction_at_rest(law: RestFriction) -> String {
             over * 1e-3
         ),
     }
+}
+
+fn inverse_friction(constant: f64, slope: f64) -> String {
+    format!(
+        "k_F(P) follows {constant:.3} + {:.1} kPa/P: this friction is not proportional to force (dry, seal, or viscous at \
+         one speed)",
+        slope * 1e-3
+    )
+}
+
+fn straight_elasticity(change: f64) -> String {
+    format!(
+        "E_1 {} linearly with pressure, by {:.0} % over the range. One bladder cannot do this; possible causes: ends that are \
+         not cylindrical, a stretching braid, a gain error, or a slow change in the order of the tests",
+        if change > 0.0 { "rises" } else { "falls" },
+        100.0 * change.abs()
+    )
 }
 
 fn concealed(rms: f64, share: f64, candidates: &[String]) -> String {
