@@ -57,6 +57,15 @@ pub struct Selected {
     pub previous: Option<Described>,
 }
 
+/// What a start found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Started {
+    /// Starts of the device, this one included; 0 where they cannot be read.
+    pub starts: u32,
+    /// Whether there was no store, or one damaged beyond repair: it is a new one now, and its settings are not to be trusted.
+    pub made_again: bool,
+}
+
 /// A kept image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Described {
@@ -173,12 +182,20 @@ impl<F: NorFlash> Store<F> {
         block_on(pin!(self.map.erase_all())).map_err(fault_of)
     }
 
+    fn found(&mut self, key: u8) -> Result<Option<&[u8]>, Error<F::Error>> {
+        block_on(pin!(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key)))
+    }
+
+    fn stored(&mut self, key: u8, value: &dyn Value<'_>) -> Result<(), Error<F::Error>> {
+        block_on(pin!(self.map.store_item_generic(&mut self.buffer[..], &key, value)))
+    }
+
     fn bytes(&mut self, key: u8) -> Result<Option<&[u8]>, StoreFault> {
-        block_on(pin!(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key))).map_err(fault_of)
+        self.found(key).map_err(fault_of)
     }
 
     fn put(&mut self, key: u8, value: &dyn Value<'_>) -> Result<(), StoreFault> {
-        block_on(pin!(self.map.store_item_generic(&mut self.buffer[..], &key, value))).map_err(fault_of)
+        self.stored(key, value).map_err(fault_of)
     }
 
     fn put_bytes(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreFault> {
@@ -322,14 +339,36 @@ impl<F: NorFlash> Store<F> {
         self.value(PAST_FAULT + (next + log - 1 - back) % log)
     }
 
-    /// Counts a start, and gives the count.
+    /// Counts a start. A store that cannot be read because something else lies on the flash, or because it is damaged beyond repair, is
+    /// made again; from then on it says that its settings are lost, until someone sends some. A flash that only fails to write, as under
+    /// a supply that sags, has lost nothing: it is read as it is, and the start is not counted.
     ///
     /// # Errors
-    /// As the medium fails.
-    pub fn count_start(&mut self) -> Result<u32, StoreFault> {
-        let mut starts = self.value::<u32>(STARTS)?.unwrap_or(0).wrapping_add(1);
-        self.put_value(STARTS, &mut starts)?;
-        Ok(starts)
+    /// As the medium fails to read, or to take a store that is made again.
+    pub fn start(&mut self) -> Result<Started, StoreFault> {
+        let mut starts = 0;
+        match self.count(&mut starts) {
+            Ok(()) => return Ok(Started { starts, made_again: false }),
+            // Whether it can be read is found out by those who read.
+            Err(Error::Storage { .. }) => return Ok(Started { starts, made_again: false }),
+            Err(_) => {}
+        }
+        self.erase()?;
+        // First, so that nobody takes what is left for a new device.
+        self.put_layout()?;
+        starts = 0;
+        self.count(&mut starts).map_err(fault_of)?;
+        Ok(Started { starts, made_again: true })
+    }
+
+    fn count(&mut self, starts: &mut u32) -> Result<(), Error<F::Error>> {
+        if let Some(bytes) = self.found(STARTS)?
+            && !fields::read(bytes, starts)
+        {
+            *starts = 0;
+        }
+        *starts = starts.wrapping_add(1);
+        self.stored(STARTS, &Written(RefCell::new(starts)))
     }
 }
 

@@ -157,3 +157,66 @@ fn a_restart_reaches_what_takes_another_firmware() {
     server.restarted(&shared).expect("a store").boot();
     assert_eq!(count.load(std::sync::atomic::Ordering::Relaxed), 2);
 }
+
+/// The settings of a user who has a lower limit and a valve test.
+fn own_settings() -> Settings {
+    let mut settings = Settings::default();
+    settings.limits.pressure_pa = 300e3;
+    settings.watch.valve_test_pa = 40e3;
+    settings
+}
+
+/// A flash with a table and settings of a user.
+fn in_use() -> MockFlash {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &image(40.0)).is_ok());
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.set_settings(&own_settings(), &mut Settings::default()), Ok(()));
+    server.store.close()
+}
+
+/// What is in force after a start: the settings, the latched fault, and whether there is a table.
+fn in_force(shared: &Shared) -> (Settings, Option<Fault>, bool) {
+    shared.with(|controller| {
+        let latched = controller.faults().latched.map(|report| report.fault);
+        (*controller.settings(), latched, controller.model(Side::Agonist).is_some())
+    })
+}
+
+#[test]
+fn writes_that_fail_at_a_start_erase_neither_settings_nor_tables() {
+    for fails in [1, 2, 3, 5, 10, 1_000] {
+        let mut flash = in_use().failing_first(fails);
+        for start in 1..=4 {
+            let shared = Shared::new(Settings::default());
+            let server = started(flash, &shared);
+            assert_eq!(in_force(&shared), (own_settings(), None, true), "start {start}, {fails} failures");
+            flash = server.store.close();
+        }
+    }
+}
+
+#[test]
+fn a_store_that_had_to_be_erased_is_trusted_at_no_start_until_settings_are_sent() {
+    let mut flash = in_use();
+    // Every page says that it is full, and none can be read.
+    flash.bytes.fill(0);
+    for start in 1..=3 {
+        let shared = Shared::new(Settings::default());
+        let server = started(flash, &shared);
+        let (_, latched, has_table) = in_force(&shared);
+        assert_eq!((latched, has_table), (Some(Fault::SettingsInvalid), false), "start {start}");
+        assert_eq!(shared.with(Controller::clear), Err(Refusal::StillFaulty(Fault::SettingsInvalid)));
+        assert!(shared.with(|controller| controller.arm(OWNER)).is_err());
+        flash = server.store.close();
+    }
+    let shared = Shared::new(Settings::default());
+    let mut server = started(flash, &shared);
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.set_settings(&own_settings(), &mut Settings::default()), Ok(()));
+    let shared = Shared::new(Settings::default());
+    let server = started(server.store.close(), &shared);
+    assert_eq!(in_force(&shared), (own_settings(), None, false), "confirmed");
+    drop(server);
+}
