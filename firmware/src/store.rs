@@ -73,7 +73,7 @@ pub struct Described {
     pub length: u16,
     /// CRC-32 of all of it.
     pub crc: u32,
-    /// Counts commits.
+    /// Counts commits, and never goes back.
     pub generation: u32,
 }
 
@@ -244,7 +244,7 @@ impl<F: NorFlash> Store<F> {
         let table = Described {
             length: u16::try_from(image.len()).map_err(|_| StoreFault::Full)?,
             crc: check::of_image(image),
-            generation: old.map_or(1, |old| old.table.generation.wrapping_add(1)),
+            generation: self.newest(side, old)?.wrapping_add(1),
         };
         let key = image_key(side, slot);
         self.put_bytes(key, image)?;
@@ -272,6 +272,15 @@ impl<F: NorFlash> Store<F> {
             return Err(StoreFault::Verify);
         }
         self.select(side, Selected { slot, table: before, previous: Some(now.table) })
+    }
+
+    /// The highest generation that anything kept of a muscle is of: both of its tables, for after a rollback the newer one is the one before,
+    /// and what effects remember, for a damaged selection gives way to one of before. A new table must not find memories of another.
+    fn newest(&mut self, side: Side, selected: Option<Selected>) -> Result<u32, StoreFault> {
+        let remembered = self.bytes(MEMORIES + side.index() as u8)?.map_or(0, |bytes| generation_of(bytes).0);
+        let tables = selected.map(|selected| (selected.table.generation, selected.previous));
+        let (now, before) = tables.unwrap_or_default();
+        Ok(now.max(before.map_or(0, |before| before.generation)).max(remembered))
     }
 
     fn select(&mut self, side: Side, mut selected: Selected) -> Result<Selected, StoreFault> {
@@ -375,15 +384,14 @@ impl<F: NorFlash> Store<F> {
 /// Hands what was kept for a table of this generation to `act`; gives how many memories there were.
 #[inline(never)]
 fn each_kept(bytes: &[u8], generation: u32, act: &mut dyn FnMut(usize, &Memory<f32>)) -> usize {
-    let mut rest = bytes;
-    let mut walk = Walk::new(&mut rest);
-    // A list is its length and its elements.
-    let (mut kept, mut count) = (0_u32, 0_u32);
-    kept.walk(&mut walk);
-    count.walk(&mut walk);
+    let (kept, mut rest) = generation_of(bytes);
     if kept != generation {
         return 0;
     }
+    let mut walk = Walk::new(&mut rest);
+    // A list is its length and its elements.
+    let mut count = 0_u32;
+    count.walk(&mut walk);
     let mut read = 0;
     while read < (count as usize).min(MAX_EFFECTS) {
         let mut memory: Memory<f32> = [0.0; MEMORY];
@@ -395,6 +403,13 @@ fn each_kept(bytes: &[u8], generation: u32, act: &mut dyn FnMut(usize, &Memory<f
         read += 1;
     }
     read
+}
+
+/// Of which table's generation memories are, and what follows.
+fn generation_of(bytes: &[u8]) -> (u32, &[u8]) {
+    let (mut rest, mut generation) = (bytes, 0_u32);
+    generation.walk(&mut Walk::new(&mut rest));
+    (generation, rest)
 }
 
 fn fits(image: &[u8], described: &Described) -> bool {

@@ -158,6 +158,35 @@ fn a_restart_reaches_what_takes_another_firmware() {
     assert_eq!(count.load(std::sync::atomic::Ordering::Relaxed), 2);
 }
 
+const SET: (EffectName, &[f64]) = (EffectName::PermanentSet, &[1e-4, 0.0, 10.0, 1e4]);
+
+/// Tables A and B, and back to A; B's effect remembers something, and that lies on the flash.
+#[test]
+fn a_table_sent_after_a_rollback_has_no_memory_of_the_one_gone_back_from() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &image(40.0)).is_ok());
+    let second = send(&mut server, &shared, &with_effects(&[MULLINS])).expect("it is taken");
+    pass(&shared, 10, &mut 0.0);
+    let worked = [3.5; model_core::effects::MEMORY];
+    shared.with(|c| c.model_mut(Side::Agonist).expect("a table").chain.restore(0, &worked));
+    server.keep(&shared);
+    let back = RollBack { side: Side::Agonist, generation: second.generation };
+    let mut first = TableInfo::default();
+    assert_eq!(Answers { server: &mut server, shared: &shared }.table_rollback(&back, &mut first), Ok(()));
+    let third = send(&mut server, &shared, &with_effects(&[SET])).expect("it is taken");
+    assert!(third.generation > second.generation, "{third:?} after {second:?}");
+    let memory = || {
+        let first =
+            |c: &Controller| c.model(Side::Agonist)?.chain.memories().next().map(|(_, memory)| *memory);
+        shared.with(|c| first(c).expect("an effect"))
+    };
+    assert_ne!(memory(), worked);
+    let server = server.restarted(&shared).expect("a store");
+    assert_ne!(memory(), worked, "after a restart");
+    drop(server);
+}
+
 /// The settings of a user who has a lower limit and a valve test.
 fn own_settings() -> Settings {
     let mut settings = Settings::default();
