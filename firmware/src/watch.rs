@@ -9,7 +9,7 @@
 //! | pressure sensors disagree | `follow_ticks` of the two apart by `second_pressure_pa` |
 //! | supply pressure low | `follow_ticks` below `supply_low_pa` |
 //! | enable open | `debounce_ticks` |
-//! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
+//! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa`; of a pair of valves also as in [`valves`](crate::valves) |
 //! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks`; a vented muscle whose pressure rises again, as when it is stretched by hand, has `vent_ticks` from then on |
 //! | hold ended | `hold_ticks` of a held command |
 //! | setpoint silence | `silence_ticks` without one |

@@ -1,6 +1,6 @@
 //! One muscle at work: its table, its readings, its loops and its regulator.
 
-use model_core::link::messages::SideSample;
+use model_core::link::messages::{Fault, Sensor, SideSample};
 use model_core::link::settings::Settings;
 use model_core::motion::MotionTracker;
 use model_core::scalar::Scalar;
@@ -11,8 +11,8 @@ use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, Bounds, Law, RegulatorState};
 use crate::signals::{Filters, Sums};
-use crate::valves::{PairOfValves, Valves};
-use crate::watch::{Seen, SideWatch};
+use crate::valves::{PairOfValves, Valves, Volume};
+use crate::watch::{Finding, Seen, SideWatch};
 
 /// One muscle at work.
 #[derive(Debug)]
@@ -117,7 +117,25 @@ impl Actuator {
         // Without a reading in this tick nothing is known of the pressure.
         let measured_pa = if self.readings.is_some() { self.sample.pressure_pa } else { f32::NAN };
         let air = self.air();
-        self.valves.step(&self.command, measured_pa, &air, settings)
+        let volume = match (self.present(), settings.stroke.fitted) {
+            (Some(_), _) => Volume::Known,
+            (None, true) => Volume::Still(self.sample.stroke_m),
+            (None, false) => Volume::Still(f32::NAN),
+        };
+        self.valves.step(&self.command, measured_pa, &air, volume, settings)
+    }
+
+    /// The pair of valves fills, and the reading of the pressure does not answer.
+    #[inline(always)]
+    pub(super) fn unanswered(&self) -> Option<Finding> {
+        let unseen_pa = self.valves.unanswered_pa()?;
+        let value = self.sample.pressure_pa;
+        Some(Finding {
+            fault: Fault::PressureNotRising,
+            sensor: Some(Sensor::Pressure),
+            value,
+            limit: value + unseen_pa,
+        })
     }
 
     /// Limits by settings, board and table, of which one has changed.

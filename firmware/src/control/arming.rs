@@ -123,6 +123,10 @@ impl Controller {
                 let (fault, value) = (Fault::ValveTest, now.pressure_pa);
                 return self.raise(side, &Finding { fault, sensor: None, value, limit: most_pa });
             }
+            // A pair of valves fills, and no pressure answers.
+            if let Some(finding) = self.sides[side.index()].unanswered() {
+                return self.raise(side, &Finding { fault: Fault::ValveTest, ..finding });
+            }
             let filled = now.pressure_pa >= enough_pa && !(filling && early);
             if filled != filling {
                 waits_for = waits_for.or(Some((side, now.pressure_pa)));

@@ -40,11 +40,18 @@ fn check(actuator: &mut Actuator, settings: &Settings, report: &mut dyn FnMut(Fi
 }
 
 impl Controller {
+    /// The faults that hold, as bits. A pair of valves goes on filling while a command is held: where the pressure does not answer, it is not.
+    pub(super) fn hold_on(&self) -> u32 {
+        let settings = &self.settings;
+        let never = if settings.valves.is_fitted() { 1 << Fault::PressureNotRising.code() } else { 0 };
+        settings.hold_on & !never
+    }
+
     /// What is a fault in the present state. A muscle that the running mode does not use is watched as if disarmed. While valves are tested
     /// the device is watched as if armed: it is disarmed, but its muscles are under pressure.
     pub(super) fn watch(&mut self, inputs: &Inputs) -> Found {
         let mut found = Found::default();
-        let hold_on = self.settings.hold_on;
+        let hold_on = self.hold_on();
         let state = match self.machine.state() {
             State::Disarmed if self.arming != Arming::Idle => State::Armed,
             state => state,
@@ -65,6 +72,9 @@ impl Controller {
             let readings = actuator.readings;
             if !used && readings.is_none() {
                 continue;
+            }
+            if let Some(finding) = actuator.unanswered() {
+                note(side, if used { state } else { State::Disarmed }, finding);
             }
             let seen = actuator.seen();
             if actuator.watch.pass(&seen, settings) {
