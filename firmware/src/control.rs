@@ -34,6 +34,7 @@ mod latch;
 mod monitor;
 mod record;
 mod requests;
+mod standing;
 
 pub use check::{check_settings, repair_settings};
 

@@ -224,6 +224,11 @@ impl Model {
         self.taut_n
     }
 
+    /// Half of the blocked force, N: more than a usable table is wrong by.
+    pub fn half_blocked_n(&self) -> f32 {
+        (0.5 / TAUT) * self.taut_n
+    }
+
     /// The pressure for a demanded force in this tick, and whether it can be reached; `rests` where friction is not to turn while the same
     /// force is demanded, `share` of it corrected.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {

@@ -5,7 +5,8 @@
 //! | sensor out of range, no readings, over-pressure, over-stroke, over-force, over-speed | `debounce_ticks` in a row (default 2), so the command changes within 3 ms |
 //! | sensor stuck | `stuck_ticks` of bit-equal readings while the command moved by 20 kPa |
 //! | sensor noisy | the last of `noisy_jumps` jumps within 256 ticks |
-//! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
+//! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n`; where that is zero, in modes that control the stroke, of a table that is above the load cell by half of the blocked force |
+//! | stroke stands still | without a load cell, while the stroke of one muscle is controlled: `follow_ticks` of a force of the table that has risen by half of the blocked force and the load of the settings, while the stroke has stayed within its band |
 //! | pressure sensors disagree | `follow_ticks` of the two apart by `second_pressure_pa` |
 //! | supply pressure low | `follow_ticks` below `supply_low_pa` |
 //! | enable open | `debounce_ticks` |
@@ -175,6 +176,8 @@ pub struct Seen {
     pub expected_pa: f32,
     /// Force by the table, where there is one, N.
     pub model_n: Option<f32>,
+    /// By how much that may be above the load cell where the settings do not compare them, N; zero for no comparison.
+    pub most_above_n: f32,
 }
 
 impl SideWatch {
@@ -205,11 +208,14 @@ impl SideWatch {
         self.check_limits(&now, seen, settings, report);
         self.check_second(now.pressure_pa, seen.second_pa, settings, report);
         self.check_pressure(now.pressure_pa, seen.expected_pa, settings, report);
-        let miss = seen.model_n.map_or(0.0, |model| (model - now.force_n).abs());
-        let apart = settings.force.fitted && watch.disagree_n > 0.0 && miss > watch.disagree_n;
+        let above = seen.model_n.map_or(0.0, |model| model - now.force_n);
+        let (miss, limit) = match watch.disagree_n > 0.0 {
+            true => (above.abs(), watch.disagree_n),
+            false => (above, seen.most_above_n),
+        };
+        let apart = settings.force.fitted && limit > 0.0 && miss > limit;
         if self.disagree.count(apart, watch.disagree_ticks) {
-            let fault = Fault::SensorsDisagree;
-            report(Finding { fault, sensor: None, value: miss, limit: watch.disagree_n });
+            report(Finding { fault: Fault::SensorsDisagree, sensor: None, value: miss, limit });
         }
     }
 

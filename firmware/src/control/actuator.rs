@@ -6,6 +6,7 @@ use model_core::motion::MotionTracker;
 use model_core::scalar::Scalar;
 
 use super::motion_settings;
+use super::standing::Standing;
 use crate::board::{Command, Hardware, Readings};
 use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
@@ -45,6 +46,8 @@ pub(super) struct Actuator {
     pub(super) model_n: Option<f32>,
     /// The load cell against the table.
     pub(super) health: Health,
+    /// Where the stroke has stood still.
+    pub(super) standing: Standing,
 }
 
 impl Actuator {
@@ -72,12 +75,13 @@ impl Actuator {
             trim_pa: 0.0,
             model_n: None,
             health: Health::default(),
+            standing: Standing::default(),
         }
     }
 
     /// What the watches look at.
     #[inline(always)]
-    pub(super) fn seen(&self) -> Seen {
+    pub(super) fn seen(&self, most_above_n: f32) -> Seen {
         Seen {
             readings: self.readings,
             second_pa: self.second_pa,
@@ -85,6 +89,7 @@ impl Actuator {
             command: self.command,
             expected_pa: self.regulator.model_pa(),
             model_n: self.model_n,
+            most_above_n,
         }
     }
 

@@ -8,7 +8,7 @@ use super::arming::Arming;
 use super::{Controller, in_register};
 use crate::board::Inputs;
 use crate::safety;
-use crate::watch::Finding;
+use crate::watch::{Finding, Seen};
 
 /// Faults that were found in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,9 +34,8 @@ impl Found {
 /// All watches of a muscle. Apart from a calm tick, which needs nothing of it.
 #[cold]
 #[inline(never)]
-fn check(actuator: &mut Actuator, settings: &Settings, report: &mut dyn FnMut(Finding)) {
-    let seen = actuator.seen();
-    actuator.watch.check(&seen, settings, report);
+fn check(actuator: &mut Actuator, seen: &Seen, settings: &Settings, report: &mut dyn FnMut(Finding)) {
+    actuator.watch.check(seen, settings, report);
 }
 
 impl Controller {
@@ -65,6 +64,7 @@ impl Controller {
                 found.venting = found.venting.or(Some((side, finding)));
             }
         };
+        let relies = state == State::Running && matches!(self.mode, Mode::Stroke | Mode::Pair);
         for side in Side::ALL {
             let used = self.uses(side);
             let Self { sides, settings, .. } = self;
@@ -76,12 +76,19 @@ impl Controller {
             if let Some(finding) = actuator.unanswered() {
                 note(side, if used { state } else { State::Disarmed }, finding);
             }
-            let seen = actuator.seen();
+            let mut most_above_n = 0.0;
+            if relies && used {
+                most_above_n = actuator.half_blocked_n();
+                if let Some(finding) = actuator.stands(self.mode, settings) {
+                    note(side, state, finding);
+                }
+            }
+            let seen = actuator.seen(most_above_n);
             if actuator.watch.pass(&seen, settings) {
                 continue;
             }
             let state = if used { state } else { State::Disarmed };
-            check(actuator, settings, &mut |finding| note(side, state, finding));
+            check(actuator, &seen, settings, &mut |finding| note(side, state, finding));
         }
         let mut note = |fault, value, limit| {
             note(Side::Agonist, state, Finding { fault, sensor: None, value, limit });
