@@ -229,7 +229,7 @@ impl Model {
         (0.5 / TAUT) * self.taut_n
     }
 
-    /// The pressure for a demanded force in this tick, and whether it can be reached; `rests` where friction is not to turn while the same
+    /// The pressure for a demanded force in this tick, not a number where the force or that of the table is none, and whether it can be reached; `rests` where friction is not to turn while the same
     /// force is demanded, `share` of it corrected.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {
         let still_s = if self.demand.force_n == force_n { self.demand.still_s + TICK_S } else { 0.0 };
@@ -255,7 +255,11 @@ impl Model {
         };
         now.context.direction = direction;
         self.slope = found.slope;
-        (found.pressure.pascals(), found.reach == Reach::Reached)
+        match found.reach {
+            // No pressure: the tick that demands it is a fault, and vents.
+            Reach::NotANumber => (f32::NAN, false),
+            reach => (found.pressure.pascals(), reach == Reach::Reached),
+        }
     }
 
     /// `∂F/∂P` where the last search ended, N/Pa.

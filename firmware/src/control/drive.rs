@@ -107,6 +107,10 @@ impl Controller {
         [force_n, coming_n]: [f32; 2],
         foreseen_n: f32,
     ) -> (Demand, bool) {
+        // Limits and inverse would make a pressure of it.
+        if !(force_n.is_finite() && coming_n.is_finite()) {
+            return (Demand { pressure_pa: f32::NAN, lookahead_pa: 0.0 }, false);
+        }
         let settings = in_register(&self.settings);
         let actuator = &mut self.sides[at];
         actuator.force_demand_n = force_n;

@@ -171,7 +171,7 @@ impl Reachability {
                 Reach::Reached => {}
                 Reach::BeyondBlockedForce => self.beyond_blocked_force += 1,
                 Reach::BelowDeadband => self.below_deadband += 1,
-                Reach::NotRising => self.not_rising += 1,
+                Reach::NotRising | Reach::NotANumber => self.not_rising += 1,
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Modes that control the stroke, with a stroke sensor that is frozen, noisy at one place, or not there.
 
 use model_core::link::messages::Field;
+use model_core::link::settings::FeedForward;
 use model_core::table;
 
 use super::*;
@@ -93,6 +94,41 @@ fn a_known_load_may_be_lifted_before_the_stroke_moves() {
     let read = |_: u32, pressure_pa: f32| (if pressure_pa > 380e3 { 1e-4 } else { 0.0 }, 0.0);
     pass(&mut controller, &mut 0.0, 5_000, read);
     assert_eq!((controller.state(), latched(&controller)), (State::Running, None));
+}
+
+/// A setpoint is any number, and the stroke loop may take one infinity from another.
+#[test]
+fn a_demanded_force_that_is_no_number_vents_in_its_tick() {
+    for feed_forward in [FeedForward::Table, FeedForward::Gaylord, FeedForward::Off] {
+        let mut controller = in_stroke_mode(|s| {
+            s.feed_forward = feed_forward;
+            s.stroke_loop.load_stiffness_n_per_m = -1e9;
+        });
+        to_stroke(&mut controller, -1e36);
+        let most_pa = pass(&mut controller, &mut 0.0, 1, |_, _| (0.0, 0.0));
+        assert_eq!(latched(&controller), Some((Fault::NotANumber, None)), "{feed_forward:?}");
+        assert_eq!(most_pa, 0.0, "nothing was commanded");
+        assert!(controller.is_vented());
+    }
+}
+
+/// Such a table is refused; here it comes into force all the same.
+#[test]
+fn a_table_whose_force_is_no_number_vents_in_the_tick_that_demands_one() {
+    let mut controller = in_stroke_mode(|_| ());
+    assert_eq!(controller.start(Mode::Force, OWNER), Ok(()));
+    let model = controller.model_mut(Side::Agonist).expect("a table");
+    // An effect that gives no number.
+    let effect = model_core::effects::FittedEffect::new(
+        model_core::effects::EffectName::CoulombFriction,
+        &[f64::NAN, f64::NAN],
+    );
+    model.chain.resume(&[effect]);
+    let order = SetPointOrder { set_point: SetPoint::Force(10.0), session: OWNER };
+    assert_eq!(controller.set_point(order), Ok(()));
+    let most_pa = pass(&mut controller, &mut 0.0, 1, |_, _| (1e-3, 0.0));
+    assert_eq!(latched(&controller), Some((Fault::NotANumber, None)));
+    assert_eq!(most_pa, 0.0, "nothing was commanded");
 }
 
 #[test]
