@@ -73,6 +73,8 @@ pub struct Controller {
     hardware: &'static Hardware,
     machine: Machine,
     arming: Arming,
+    /// The muscles whose valves the test before arming tries.
+    tested: [bool; 2],
     /// Whether someone has to send settings before the device can be armed.
     unconfirmed: bool,
     mode: Mode,
@@ -124,6 +126,7 @@ impl Controller {
             law,
             hardware,
             arming: Arming::Idle,
+            tested: [false; 2],
             unconfirmed: false,
             held_ticks: 0,
             machine: Machine::default(),
