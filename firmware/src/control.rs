@@ -21,7 +21,7 @@ use crate::pair::PairState;
 use crate::reference::Generator;
 use crate::regulator::Law;
 use crate::safety::Machine;
-use crate::signals::{self, Filters};
+use crate::signals::{self, Filters, Speed};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
 use crate::watch::{Finding, InARow};
@@ -221,6 +221,7 @@ impl Controller {
             side.bound(settings, self.hardware, &self.law);
             side.motion = MotionTracker::new(motion_settings(settings));
             side.filters = Filters::new(&settings.scales);
+            side.unfiltered = Speed::default();
             side.watch.restart();
         }
     }
@@ -365,8 +366,14 @@ impl Controller {
         if !(pressure_pa.is_finite() && stroke_m.is_finite()) {
             return None;
         }
+        if scales.stroke.filter_s > 0.0 {
+            actuator.unfiltered.next(readings.stroke_m);
+        }
+        // Only effects remember.
+        let remembers = actuator.model.as_ref().is_some_and(|model| !model.chain.is_empty());
+        let trusted = !remembers || actuator.trusts(&readings, &self.settings);
         let motion = single_precision::follow(&mut actuator.motion, TICK_S, stroke_m, pressure_pa);
-        let model_n = actuator.model.as_mut()?.tick(motion, pressure_pa);
+        let model_n = actuator.model.as_mut()?.tick_trusted(motion, pressure_pa, trusted);
         actuator.sample.model_n = model_n;
         Some(model_n)
     }

@@ -170,7 +170,13 @@ impl Model {
     }
 
     /// Lets one tick pass: the shape at the measured stroke, a step of the effects, and the force at the readings, N.
+    #[inline(always)]
     pub fn tick(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> f32 {
+        self.tick_trusted(motion, pressure_pa, true)
+    }
+
+    /// The same where the readings may be false: then no effect remembers them.
+    pub fn tick_trusted(&mut self, motion: &Motion<f32>, pressure_pa: f32, trusted: bool) -> f32 {
         let direction = self.slid(motion, pressure_pa);
         let Self { muscle, chain, now, .. } = self;
         let pressure = Pressure::from_pascals(pressure_pa);
@@ -186,7 +192,9 @@ impl Model {
         } else {
             single_precision::update(muscle, now, motion, pressure);
             now.context.direction = direction;
-            single_precision::step(chain, &now.context);
+            if trusted {
+                single_precision::step(chain, &now.context);
+            }
             muscle.pull(now.context.force() + single_precision::effects(chain, &now.context))
         };
         newtons.newtons()

@@ -98,6 +98,12 @@ struct OneSensor {
 }
 
 impl OneSensor {
+    /// Whether a reading may be true by itself and after the one before. What is not fitted is not judged.
+    fn may_be(&self, watch: &SensorWatch, value: f32) -> bool {
+        let calm = !self.seen || (value - self.last).abs() <= watch.jump;
+        !watch.fitted || (value >= watch.low && value <= watch.high && calm)
+    }
+
     fn check(
         &mut self,
         sensor: Sensor,
@@ -181,6 +187,12 @@ pub struct Seen {
 }
 
 impl SideWatch {
+    /// Whether the readings of pressure and stroke of a tick that has not been looked at yet may be true.
+    pub(crate) fn may_be(&self, now: &Readings, settings: &Settings) -> bool {
+        self.pressure.may_be(&settings.pressure, now.pressure_pa)
+            && self.stroke.may_be(&settings.stroke, now.stroke_m)
+    }
+
     /// Restarts, except for how long the muscle has been vented.
     pub fn restart(&mut self) {
         *self = Self { vented_ticks: self.vented_ticks, ..Self::default() };

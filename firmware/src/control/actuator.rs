@@ -11,15 +11,22 @@ use crate::board::{Command, Hardware, Readings};
 use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, Bounds, Law, RegulatorState};
-use crate::signals::{Filters, Sums};
+use crate::signals::{Filters, Speed, Sums};
 use crate::valves::{PairOfValves, Valves, Volume};
 use crate::watch::{Finding, Seen, SideWatch};
+
+/// Ticks after a reading that was false in which none is remembered: as many as a fault may wait for the next good one.
+const DOUBT_TICKS: u8 = 20;
 
 /// One muscle at work.
 #[derive(Debug)]
 pub(super) struct Actuator {
     pub(super) model: Seat,
     pub(super) motion: MotionTracker<f32>,
+    /// Speed of the stroke before its filter.
+    pub(super) unfiltered: Speed,
+    /// Ticks for which no reading is remembered after one that was false.
+    pub(super) doubt: u8,
     pub(super) watch: SideWatch,
     pub(super) regulator: RegulatorState,
     /// The valves in place of a regulator.
@@ -56,6 +63,8 @@ impl Actuator {
         Self {
             model,
             motion: MotionTracker::new(motion_settings(settings)),
+            unfiltered: Speed::default(),
+            doubt: 0,
             watch: SideWatch::default(),
             regulator: RegulatorState::default(),
             valves: PairOfValves::default(),
@@ -81,16 +90,27 @@ impl Actuator {
 
     /// What the watches look at.
     #[inline(always)]
-    pub(super) fn seen(&self, most_above_n: f32) -> Seen {
+    pub(super) fn seen(&self, most_above_n: f32, settings: &Settings) -> Seen {
+        let filters = settings.scales.stroke.filter_s > 0.0;
         Seen {
             readings: self.readings,
             second_pa: self.second_pa,
-            speed_m_per_s: self.motion.motion().speed,
+            speed_m_per_s: if filters { self.unfiltered.speed() } else { self.motion.motion().speed },
             command: self.command,
             expected_pa: self.regulator.model_pa(),
             model_n: self.model_n,
             most_above_n,
         }
+    }
+
+    /// Whether what is read may be remembered: it is within the ranges of its sensors, and has not jumped within the longest glitch.
+    pub(super) fn trusts(&mut self, now: &Readings, settings: &Settings) -> bool {
+        if !self.watch.may_be(now, settings) {
+            self.doubt = DOUBT_TICKS;
+            return false;
+        }
+        self.doubt = self.doubt.saturating_sub(1);
+        self.doubt == 0
     }
 
     /// Lets the air out, and nothing of what was demanded stays.

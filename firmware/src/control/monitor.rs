@@ -83,7 +83,7 @@ impl Controller {
                     note(side, state, finding);
                 }
             }
-            let seen = actuator.seen(most_above_n);
+            let seen = actuator.seen(most_above_n, settings);
             if actuator.watch.pass(&seen, settings) {
                 continue;
             }
