@@ -120,13 +120,28 @@ impl<F: NorFlash> Server<F> {
         }
     }
 
-    /// Has the controller use the kept table of a muscle, its effects with the memories that were kept. In two functions that are not
-    /// inlined: the second reuses the stack of the first.
+    /// Has the controller use the kept table of a muscle, its effects with the memories that were kept. Where it cannot be used, no other
+    /// stays in use. In two functions that are not inlined: the second reuses the stack of the first.
     fn use_kept(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
-        if self.use_table(side, shared)? {
-            self.remember(side, shared);
+        match self.use_table(side, shared) {
+            Ok(true) => self.remember(side, shared),
+            Ok(false) => {}
+            Err(refusal) => {
+                shared.with(|controller| controller.forget_table(side));
+                return Err(refusal);
+            }
         }
         Ok(())
+    }
+
+    /// The same after a request has changed what is kept, or has failed to: what cannot be used latches a fault.
+    fn use_again(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
+        let used = self.use_kept(side, shared);
+        if used.is_err() {
+            let finding = Finding { fault: Fault::TableInvalid, sensor: None, value: 0.0, limit: 0.0 };
+            shared.with(|controller| controller.raise(side, &finding));
+        }
+        used
     }
 
     /// Has the controller use the kept table of a muscle; returns whether there is one.

@@ -249,3 +249,21 @@ fn a_store_that_had_to_be_erased_is_trusted_at_no_start_until_settings_are_sent(
     assert_eq!(in_force(&shared), (own_settings(), None, false), "confirmed");
     drop(server);
 }
+
+/// A new table cannot be kept, and the one before cannot be read any more: no table is in use, and not the one that was refused.
+#[test]
+fn a_refused_table_does_not_stay_in_use_where_the_one_before_is_damaged() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    let before = image(40.0);
+    assert!(send(&mut server, &shared, &before).is_ok());
+    let empty = Store::open(MockFlash::erased()).expect("a store");
+    let mut flash = core::mem::replace(&mut server.store, empty).close();
+    let place = flash.bytes.windows(64).position(|bytes| bytes == &before[..64]).expect("it is on the flash");
+    flash.bytes[place + 10] ^= 0x10;
+    server.store = Store::open(flash.failing_after(0)).expect("a store");
+    assert!(matches!(send(&mut server, &shared, &image(60.0)), Err(Refusal::Store(_))));
+    let (_, latched, has_table) = in_force(&shared);
+    assert_eq!((latched, has_table), (Some(Fault::TableInvalid), false));
+    assert_eq!(deadband_in_use(&shared), None);
+}
