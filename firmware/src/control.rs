@@ -85,6 +85,8 @@ pub struct Controller {
     lookahead: f32,
     lookahead_step: f32,
     setpoint_age: u32,
+    /// Pressure at which the mode was started, until there is an order: a start moves nothing.
+    begun_pa: Option<f32>,
     /// The session that armed the device or started its mode.
     owner: Session,
     /// Ticks since the owner's last keep-alive request.
@@ -137,6 +139,7 @@ impl Controller {
             lookahead: 0.0,
             lookahead_step: 0.0,
             setpoint_age: 0,
+            begun_pa: None,
             owner: Session::default(),
             owner_age: 0,
             sides: [Actuator::new(settings, first, bounds), Actuator::new(settings, second, bounds)],

@@ -71,6 +71,7 @@ impl Controller {
             Mode::Pair => (first.stroke_m - self.sides[1].sample.stroke_m) / (2.0 * joint.radius_m),
         };
         self.setpoint_age = 0;
+        self.begun_pa = Some(first.pressure_pa.max(0.0));
         for side in &mut self.sides {
             match (continues, side.command.vent) {
                 (true, false) => {}
@@ -210,6 +211,7 @@ impl Controller {
         self.generator.begin(Reference::SetPoint)?;
         (self.setpoint, self.setpoint_second) = (asked, second);
         self.setpoint_age = 0;
+        self.begun_pa = None;
         Ok(())
     }
 
@@ -258,6 +260,7 @@ impl Controller {
         // Here, so that no tick has all of it to do.
         self.generator.look_ahead(self.law.ahead());
         self.setpoint_age = 0;
+        self.begun_pa = None;
         self.trace.on_start();
         Ok(())
     }
