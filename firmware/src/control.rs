@@ -21,7 +21,7 @@ use crate::pair::PairState;
 use crate::reference::Generator;
 use crate::regulator::Law;
 use crate::safety::Machine;
-use crate::signals::{self, Filters};
+use crate::signals::{self, Filters, Speed};
 use crate::tick::{TICK_S, TICK_US};
 use crate::trace::Trace;
 use crate::watch::{Finding, InARow};
@@ -34,6 +34,7 @@ mod latch;
 mod monitor;
 mod record;
 mod requests;
+mod standing;
 
 pub use check::{check_settings, repair_settings};
 
@@ -72,6 +73,8 @@ pub struct Controller {
     hardware: &'static Hardware,
     machine: Machine,
     arming: Arming,
+    /// The muscles whose valves the test before arming tries.
+    tested: [bool; 2],
     /// Whether someone has to send settings before the device can be armed.
     unconfirmed: bool,
     mode: Mode,
@@ -82,6 +85,8 @@ pub struct Controller {
     lookahead: f32,
     lookahead_step: f32,
     setpoint_age: u32,
+    /// Pressure at which the mode was started, until there is an order: a start moves nothing.
+    begun_pa: Option<f32>,
     /// The session that armed the device or started its mode.
     owner: Session,
     /// Ticks since the owner's last keep-alive request.
@@ -123,6 +128,7 @@ impl Controller {
             law,
             hardware,
             arming: Arming::Idle,
+            tested: [false; 2],
             unconfirmed: false,
             held_ticks: 0,
             machine: Machine::default(),
@@ -133,6 +139,7 @@ impl Controller {
             lookahead: 0.0,
             lookahead_step: 0.0,
             setpoint_age: 0,
+            begun_pa: None,
             owner: Session::default(),
             owner_age: 0,
             sides: [Actuator::new(settings, first, bounds), Actuator::new(settings, second, bounds)],
@@ -217,6 +224,7 @@ impl Controller {
             side.bound(settings, self.hardware, &self.law);
             side.motion = MotionTracker::new(motion_settings(settings));
             side.filters = Filters::new(&settings.scales);
+            side.unfiltered = Speed::default();
             side.watch.restart();
         }
     }
@@ -361,8 +369,14 @@ impl Controller {
         if !(pressure_pa.is_finite() && stroke_m.is_finite()) {
             return None;
         }
+        if scales.stroke.filter_s > 0.0 {
+            actuator.unfiltered.next(readings.stroke_m);
+        }
+        // Only effects remember.
+        let remembers = actuator.model.as_ref().is_some_and(|model| !model.chain.is_empty());
+        let trusted = !remembers || actuator.trusts(&readings, &self.settings);
         let motion = single_precision::follow(&mut actuator.motion, TICK_S, stroke_m, pressure_pa);
-        let model_n = actuator.model.as_mut()?.tick(motion, pressure_pa);
+        let model_n = actuator.model.as_mut()?.tick_trusted(motion, pressure_pa, trusted);
         actuator.sample.model_n = model_n;
         Some(model_n)
     }

@@ -170,7 +170,13 @@ impl Model {
     }
 
     /// Lets one tick pass: the shape at the measured stroke, a step of the effects, and the force at the readings, N.
+    #[inline(always)]
     pub fn tick(&mut self, motion: &Motion<f32>, pressure_pa: f32) -> f32 {
+        self.tick_trusted(motion, pressure_pa, true)
+    }
+
+    /// The same where the readings may be false: then no effect remembers them.
+    pub fn tick_trusted(&mut self, motion: &Motion<f32>, pressure_pa: f32, trusted: bool) -> f32 {
         let direction = self.slid(motion, pressure_pa);
         let Self { muscle, chain, now, .. } = self;
         let pressure = Pressure::from_pascals(pressure_pa);
@@ -186,7 +192,9 @@ impl Model {
         } else {
             single_precision::update(muscle, now, motion, pressure);
             now.context.direction = direction;
-            single_precision::step(chain, &now.context);
+            if trusted {
+                single_precision::step(chain, &now.context);
+            }
             muscle.pull(now.context.force() + single_precision::effects(chain, &now.context))
         };
         newtons.newtons()
@@ -224,7 +232,12 @@ impl Model {
         self.taut_n
     }
 
-    /// The pressure for a demanded force in this tick, and whether it can be reached; `rests` where friction is not to turn while the same
+    /// Half of the blocked force, N: more than a usable table is wrong by.
+    pub fn half_blocked_n(&self) -> f32 {
+        (0.5 / TAUT) * self.taut_n
+    }
+
+    /// The pressure for a demanded force in this tick, not a number where the force or that of the table is none, and whether it can be reached; `rests` where friction is not to turn while the same
     /// force is demanded, `share` of it corrected.
     pub fn pressure_for(&mut self, force_n: f32, guess_pa: f32, rests: bool, share: f32) -> (f32, bool) {
         let still_s = if self.demand.force_n == force_n { self.demand.still_s + TICK_S } else { 0.0 };
@@ -250,7 +263,11 @@ impl Model {
         };
         now.context.direction = direction;
         self.slope = found.slope;
-        (found.pressure.pascals(), found.attainability == Attainability::Attainable)
+        match found.attainability {
+            // No pressure: the tick that demands it is a fault, and vents.
+            Attainability::NotANumber => (f32::NAN, false),
+            attainability => (found.pressure.pascals(), attainability == Attainability::Attainable),
+        }
     }
 
     /// `∂F/∂P` where the last search ended, N/Pa.

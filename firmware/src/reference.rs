@@ -149,6 +149,9 @@ impl Generator {
         {
             return Err(Refusal::Value(Field::Reference));
         }
+        if self.ends_with(piece) {
+            return Ok(self.points.len() as u16);
+        }
         if piece.offset == 0 {
             self.points.clear();
         }
@@ -159,6 +162,13 @@ impl Generator {
             self.points.push(CompactFloat::of(*point)).map_err(|_| Refusal::Range)?;
         }
         Ok(self.points.len() as u16)
+    }
+
+    /// Whether a piece is the last one once more: its answer was lost, and the host repeats it.
+    fn ends_with(&self, piece: &ReferencePoints) -> bool {
+        let there = self.points.get(usize::from(piece.offset)..).unwrap_or_default();
+        let same = |(there, point): (&CompactFloat, &f32)| *there == CompactFloat::of(*point);
+        !there.is_empty() && there.len() == piece.points.len() && there.iter().zip(&piece.points).all(same)
     }
 
     /// Makes the values of this tick and n later ones, as far as they are not there yet: one each tick, and the first of them
@@ -342,6 +352,38 @@ mod tests {
         assert_eq!(generator.begin(Reference::Table { step_s: 0.01, repeat: true }), Ok(()));
         let values = run(&mut generator, 60);
         assert_eq!((values[25], values[30], values[35]), (2.0, 0.0, 5.0));
+    }
+
+    /// The answer to a piece was lost on the line, and the host sends it again.
+    #[test]
+    fn the_last_piece_of_a_table_may_come_twice_and_no_other() {
+        let piece = |offset, points: &[f32]| ReferencePoints {
+            offset,
+            points: points.iter().copied().collect(),
+            ..ReferencePoints::default()
+        };
+        let mut generator = Generator::default();
+        for _ in 0..3 {
+            assert_eq!(generator.take_points(&piece(0, &[0.0, 0.1, 4.0])), Ok(3));
+        }
+        for _ in 0..3 {
+            assert_eq!(generator.take_points(&piece(3, &[7.0, 0.3])), Ok(5));
+        }
+        for other in [
+            piece(3, &[7.0, 0.4]),
+            piece(3, &[7.0]),
+            piece(2, &[4.0]),
+            piece(4, &[0.3, 1.0]),
+            piece(6, &[1.0]),
+        ] {
+            assert_eq!(generator.take_points(&other), Err(Refusal::Range), "{other:?}");
+        }
+        assert_eq!(generator.take_points(&piece(5, &[2.0])), Ok(6));
+        assert_eq!(generator.begin(Reference::Table { step_s: 0.001, repeat: false }), Ok(()));
+        assert_eq!(
+            run(&mut generator, 6),
+            [0.0, 0.1, 4.0, 7.0, 0.3, 2.0].map(|v| CompactFloat::of(v).value())
+        );
     }
 
     #[test]

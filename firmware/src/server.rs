@@ -18,7 +18,7 @@ use crate::board::Identity;
 use crate::control;
 use crate::modes::Model;
 use crate::shared::Shared;
-use crate::store::{self, Kept, Store};
+use crate::store::{self, Kept, Started, Store};
 use crate::update::Update;
 use crate::watch::Finding;
 
@@ -70,23 +70,16 @@ pub fn table_fault(error: ImageError) -> TableFault {
 }
 
 impl<F: NorFlash> Server<F> {
-    /// Opens the store, counts the start, and gives the controller its settings and tables. A damaged store is made again,
-    /// a damaged table is not used; both latch a fault, so that someone looks before anything moves.
+    /// Opens the store, counts the start, and gives the controller its settings and tables. A store damaged beyond repair is made again,
+    /// a damaged table is not used; both latch a fault, so that someone looks before anything moves. A write that fails erases nothing.
     ///
     /// # Errors
-    /// The flash cannot hold a store at all.
+    /// The flash cannot hold a store at all, or cannot be read.
     #[inline(never)]
     pub fn start(identity: Identity, flash: F, shared: &Shared) -> Result<Self, StoreFault> {
         let mut store = Store::open(flash)?;
-        let mut damaged = false;
-        let starts = match store.count_start() {
-            Ok(starts) => starts,
-            Err(_) => {
-                damaged = true;
-                store.erase()?;
-                store.count_start()?
-            }
-        };
+        let Started { starts, made_again } = store.start()?;
+        let mut damaged = made_again;
         use_settings(&mut store, damaged, shared)?;
         let counts = [frame::Counts::default(); 2];
         let mut server = Self {
@@ -127,13 +120,28 @@ impl<F: NorFlash> Server<F> {
         }
     }
 
-    /// Has the controller use the kept table of a muscle, its effects with the memories that were kept. In two functions that are not
-    /// inlined: the second reuses the stack of the first.
+    /// Has the controller use the kept table of a muscle, its effects with the memories that were kept. Where it cannot be used, no other
+    /// stays in use. In two functions that are not inlined: the second reuses the stack of the first.
     fn use_kept(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
-        if self.use_table(side, shared)? {
-            self.remember(side, shared);
+        match self.use_table(side, shared) {
+            Ok(true) => self.remember(side, shared),
+            Ok(false) => {}
+            Err(refusal) => {
+                shared.with(|controller| controller.forget_table(side));
+                return Err(refusal);
+            }
         }
         Ok(())
+    }
+
+    /// The same after a request has changed what is kept, or has failed to: what cannot be used latches a fault.
+    fn use_again(&mut self, side: Side, shared: &Shared) -> Result<(), Refusal> {
+        let used = self.use_kept(side, shared);
+        if used.is_err() {
+            let finding = Finding { fault: Fault::TableInvalid, sensor: None, value: 0.0, limit: 0.0 };
+            shared.with(|controller| controller.raise(side, &finding));
+        }
+        used
     }
 
     /// Has the controller use the kept table of a muscle; returns whether there is one.

@@ -73,6 +73,31 @@ impl Filters {
     }
 }
 
+/// Time constant of a speed, s: that of the tracker of the filtered motion.
+const SPEED_S: f32 = 0.02;
+
+/// Speed of a stroke before its filter, for the watch: `v += (Δx/Δt − v) · Δt / (T + Δt)`. A filter would hide how fast a load that has come
+/// off moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Speed {
+    last_m: Option<f32>,
+    speed_m_per_s: f32,
+}
+
+impl Speed {
+    /// The next reading; it is a number.
+    pub fn next(&mut self, stroke_m: f32) {
+        let last_m = self.last_m.replace(stroke_m).unwrap_or(stroke_m);
+        let now = (stroke_m - last_m) * (1.0 / TICK_S);
+        self.speed_m_per_s += (now - self.speed_m_per_s) * (TICK_S / (SPEED_S + TICK_S));
+    }
+
+    /// The speed, m/s.
+    pub fn speed(&self) -> f32 {
+        self.speed_m_per_s
+    }
+}
+
 /// Sums of a muscle's signals over the first second after they were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {

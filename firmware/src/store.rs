@@ -57,6 +57,15 @@ pub struct Selected {
     pub previous: Option<Described>,
 }
 
+/// What a start found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Started {
+    /// Starts of the device, this one included; 0 where they cannot be read.
+    pub starts: u32,
+    /// Whether there was no store, or one damaged beyond repair: it is a new one now, and its settings are not to be trusted.
+    pub made_again: bool,
+}
+
 /// A kept image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Described {
@@ -64,7 +73,7 @@ pub struct Described {
     pub length: u16,
     /// CRC-32 of all of it.
     pub crc: u32,
-    /// Counts commits.
+    /// Counts commits, and never goes back.
     pub generation: u32,
 }
 
@@ -173,12 +182,20 @@ impl<F: NorFlash> Store<F> {
         block_on(pin!(self.map.erase_all())).map_err(fault_of)
     }
 
+    fn found(&mut self, key: u8) -> Result<Option<&[u8]>, Error<F::Error>> {
+        block_on(pin!(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key)))
+    }
+
+    fn stored(&mut self, key: u8, value: &dyn Value<'_>) -> Result<(), Error<F::Error>> {
+        block_on(pin!(self.map.store_item_generic(&mut self.buffer[..], &key, value)))
+    }
+
     fn bytes(&mut self, key: u8) -> Result<Option<&[u8]>, StoreFault> {
-        block_on(pin!(self.map.fetch_item::<&[u8]>(&mut self.buffer[..], &key))).map_err(fault_of)
+        self.found(key).map_err(fault_of)
     }
 
     fn put(&mut self, key: u8, value: &dyn Value<'_>) -> Result<(), StoreFault> {
-        block_on(pin!(self.map.store_item_generic(&mut self.buffer[..], &key, value))).map_err(fault_of)
+        self.stored(key, value).map_err(fault_of)
     }
 
     fn put_bytes(&mut self, key: u8, bytes: &[u8]) -> Result<(), StoreFault> {
@@ -227,7 +244,7 @@ impl<F: NorFlash> Store<F> {
         let table = Described {
             length: u16::try_from(image.len()).map_err(|_| StoreFault::Full)?,
             crc: check::of_image(image),
-            generation: old.map_or(1, |old| old.table.generation.wrapping_add(1)),
+            generation: self.newest(side, old)?.wrapping_add(1),
         };
         let key = image_key(side, slot);
         self.put_bytes(key, image)?;
@@ -255,6 +272,15 @@ impl<F: NorFlash> Store<F> {
             return Err(StoreFault::Verify);
         }
         self.select(side, Selected { slot, table: before, previous: Some(now.table) })
+    }
+
+    /// The highest generation that anything kept of a muscle is of: both of its tables, for after a rollback the newer one is the one before,
+    /// and what effects remember, for a damaged selection gives way to one of before. A new table must not find memories of another.
+    fn newest(&mut self, side: Side, selected: Option<Selected>) -> Result<u32, StoreFault> {
+        let remembered = self.bytes(MEMORIES + side.index() as u8)?.map_or(0, |bytes| generation_of(bytes).0);
+        let tables = selected.map(|selected| (selected.table.generation, selected.previous));
+        let (now, before) = tables.unwrap_or_default();
+        Ok(now.max(before.map_or(0, |before| before.generation)).max(remembered))
     }
 
     fn select(&mut self, side: Side, mut selected: Selected) -> Result<Selected, StoreFault> {
@@ -322,29 +348,50 @@ impl<F: NorFlash> Store<F> {
         self.value(PAST_FAULT + (next + log - 1 - back) % log)
     }
 
-    /// Counts a start, and gives the count.
+    /// Counts a start. A store that cannot be read because something else lies on the flash, or because it is damaged beyond repair, is
+    /// made again; from then on it says that its settings are lost, until someone sends some. A flash that only fails to write, as under
+    /// a supply that sags, has lost nothing: it is read as it is, and the start is not counted.
     ///
     /// # Errors
-    /// As the medium fails.
-    pub fn count_start(&mut self) -> Result<u32, StoreFault> {
-        let mut starts = self.value::<u32>(STARTS)?.unwrap_or(0).wrapping_add(1);
-        self.put_value(STARTS, &mut starts)?;
-        Ok(starts)
+    /// As the medium fails to read, or to take a store that is made again.
+    pub fn start(&mut self) -> Result<Started, StoreFault> {
+        let mut starts = 0;
+        match self.count(&mut starts) {
+            Ok(()) => return Ok(Started { starts, made_again: false }),
+            // Whether it can be read is found out by those who read.
+            Err(Error::Storage { .. }) => return Ok(Started { starts, made_again: false }),
+            Err(_) => {}
+        }
+        self.erase()?;
+        // First, so that nobody takes what is left for a new device.
+        self.put_layout()?;
+        starts = 0;
+        self.count(&mut starts).map_err(fault_of)?;
+        Ok(Started { starts, made_again: true })
+    }
+
+    fn count(&mut self, starts: &mut u32) -> Result<(), Error<F::Error>> {
+        if let Some(bytes) = self.found(STARTS)?
+            && !fields::read(bytes, starts)
+        {
+            *starts = 0;
+        }
+        *starts = starts.wrapping_add(1);
+        self.stored(STARTS, &Written(RefCell::new(starts)))
     }
 }
 
 /// Hands what was kept for a table of this generation to `act`; gives how many memories there were.
 #[inline(never)]
 fn each_kept(bytes: &[u8], generation: u32, act: &mut dyn FnMut(usize, &Memory<f32>)) -> usize {
-    let mut rest = bytes;
-    let mut walk = Walk::new(&mut rest);
-    // A list is its length and its elements.
-    let (mut kept, mut count) = (0_u32, 0_u32);
-    kept.walk(&mut walk);
-    count.walk(&mut walk);
+    let (kept, mut rest) = generation_of(bytes);
     if kept != generation {
         return 0;
     }
+    let mut walk = Walk::new(&mut rest);
+    // A list is its length and its elements.
+    let mut count = 0_u32;
+    count.walk(&mut walk);
     let mut read = 0;
     while read < (count as usize).min(MAX_EFFECTS) {
         let mut memory: Memory<f32> = [0.0; MEMORY];
@@ -356,6 +403,13 @@ fn each_kept(bytes: &[u8], generation: u32, act: &mut dyn FnMut(usize, &Memory<f
         read += 1;
     }
     read
+}
+
+/// Of which table's generation memories are, and what follows.
+fn generation_of(bytes: &[u8]) -> (u32, &[u8]) {
+    let (mut rest, mut generation) = (bytes, 0_u32);
+    generation.walk(&mut Walk::new(&mut rest));
+    (generation, rest)
 }
 
 fn fits(image: &[u8], described: &Described) -> bool {

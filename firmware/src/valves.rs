@@ -21,6 +21,12 @@ use crate::board::Command;
 use crate::regulator::Air;
 use crate::tick::{TICK_S, TICK_US};
 
+mod answer;
+
+pub use answer::Volume;
+
+use answer::{Answer, Pulse};
+
 /// Critical ratio of pressures of a valve, from which on its flow depends on the pressure behind it: 0.2 to 0.5 by data sheets.
 pub const CRITICAL: f32 = 0.3;
 /// Pressure of the air around, Pa.
@@ -62,11 +68,21 @@ pub struct PairOfValves {
     before_s: f32,
     /// Error of pressure while a valve is open as long as it can be, Pa; else zero.
     limited_pa: f32,
+    /// What the pulse of the period before has done.
+    pulse: Pulse,
+    answer: Answer,
 }
 
 impl Default for PairOfValves {
     fn default() -> Self {
-        Self { left: 0, carry_s: 0.0, before_s: -1.0, limited_pa: 0.0 }
+        Self {
+            left: 0,
+            carry_s: 0.0,
+            before_s: -1.0,
+            limited_pa: 0.0,
+            pulse: Pulse::default(),
+            answer: Answer::default(),
+        }
     }
 }
 
@@ -89,7 +105,14 @@ fn rate(valves: &ValvePair, pressure_pa: f32, air: &Air, fills: bool) -> f32 {
 
 impl PairOfValves {
     /// One tick: towards a command, from a measured pressure.
-    pub fn step(&mut self, command: &Command, measured_pa: f32, air: &Air, settings: &Settings) -> Valves {
+    pub fn step(
+        &mut self,
+        command: &Command,
+        measured_pa: f32,
+        air: &Air,
+        volume: Volume,
+        settings: &Settings,
+    ) -> Valves {
         let valves = &settings.valves;
         if !valves.is_fitted() {
             return Valves::Absent;
@@ -106,13 +129,22 @@ impl PairOfValves {
         self.left = valves.period_ticks - 1;
         let length_s = f32::from(valves.period_ticks) * TICK_S;
         let length_us = valves.period_ticks * TICK_US as u16;
+        let before = core::mem::take(&mut self.pulse);
+        self.answer.judge(measured_pa, volume, before, settings);
         let open_s = self.open(command.pressure_pa, measured_pa, air, settings, length_s);
         // A pulse lies at the end of its period: before it there is time for the other valve to close.
         let most_s = if open_s * self.before_s < 0.0 { length_s - valves.apart_s } else { length_s };
         let open_s = open_s.within(-most_s, most_s);
         self.before_s = open_s;
+        let fills = open_s > 0.0;
+        let dead_s = if open_s.abs() < length_s { valves.dead_s } else { 0.0 };
+        let flows_pa = rate(valves, measured_pa, air, fills) * (open_s.abs() - dead_s).at_least(0.0);
+        self.pulse = Pulse {
+            through_pa: if fills { flows_pa } else { -flows_pa },
+            widened_pa: (measured_pa + ATMOSPHERE_PA) * air.widening_per_s * length_s,
+        };
         let time_us = (open_s.abs() * 1e6 + 0.5) as u16;
-        let (fill_us, vent_us) = if open_s > 0.0 { (time_us, 0) } else { (0, time_us) };
+        let (fill_us, vent_us) = if fills { (time_us, 0) } else { (0, time_us) };
         Valves::Period { fill_us: fill_us.min(length_us), vent_us: vent_us.min(length_us), length_us }
     }
 
@@ -120,6 +152,12 @@ impl PairOfValves {
     #[inline(always)]
     pub fn limited_pa(&self) -> f32 {
         self.limited_pa
+    }
+
+    /// What the fill valve has let in although the reading does not rise, Pa, once that is too much to be true.
+    #[inline(always)]
+    pub fn unanswered_pa(&self) -> Option<f32> {
+        self.answer.missing_pa()
     }
 
     /// Time for which the signal to a valve is on in this period, s; negative for the vent valve.

@@ -5,11 +5,12 @@
 //! | sensor out of range, no readings, over-pressure, over-stroke, over-force, over-speed | `debounce_ticks` in a row (default 2), so the command changes within 3 ms |
 //! | sensor stuck | `stuck_ticks` of bit-equal readings while the command moved by 20 kPa |
 //! | sensor noisy | the last of `noisy_jumps` jumps within 256 ticks |
-//! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n` |
+//! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n`; where that is zero, in modes that control the stroke, of a table that is above the load cell by half of the blocked force |
+//! | stroke stands still | without a load cell, while the stroke of one muscle is controlled: `follow_ticks` of a force of the table that has risen by half of the blocked force and the load of the settings, while the stroke has stayed within its band |
 //! | pressure sensors disagree | `follow_ticks` of the two apart by `second_pressure_pa` |
 //! | supply pressure low | `follow_ticks` below `supply_low_pa` |
 //! | enable open | `debounce_ticks` |
-//! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa` |
+//! | pressure not following | `follow_ticks` of pressure and regulator's model apart by `follow_pa`; of a pair of valves also as in [`valves`](crate::valves) |
 //! | not vented | `debounce_ticks` above `vented_pa` once the command has been to vent for `vent_ticks`; a vented muscle whose pressure rises again, as when it is stretched by hand, has `vent_ticks` from then on |
 //! | hold ended | `hold_ticks` of a held command |
 //! | setpoint silence | `silence_ticks` without one |
@@ -97,6 +98,12 @@ struct OneSensor {
 }
 
 impl OneSensor {
+    /// Whether a reading may be true by itself and after the one before. What is not fitted is not judged.
+    fn may_be(&self, watch: &SensorWatch, value: f32) -> bool {
+        let calm = !self.seen || (value - self.last).abs() <= watch.jump;
+        !watch.fitted || (value >= watch.low && value <= watch.high && calm)
+    }
+
     fn check(
         &mut self,
         sensor: Sensor,
@@ -175,9 +182,17 @@ pub struct Seen {
     pub expected_pa: f32,
     /// Force by the table, where there is one, N.
     pub model_n: Option<f32>,
+    /// By how much that may be above the load cell where the settings do not compare them, N; zero for no comparison.
+    pub most_above_n: f32,
 }
 
 impl SideWatch {
+    /// Whether the readings of pressure and stroke of a tick that has not been looked at yet may be true.
+    pub(crate) fn may_be(&self, now: &Readings, settings: &Settings) -> bool {
+        self.pressure.may_be(&settings.pressure, now.pressure_pa)
+            && self.stroke.may_be(&settings.stroke, now.stroke_m)
+    }
+
     /// Restarts, except for how long the muscle has been vented.
     pub fn restart(&mut self) {
         *self = Self { vented_ticks: self.vented_ticks, ..Self::default() };
@@ -205,11 +220,14 @@ impl SideWatch {
         self.check_limits(&now, seen, settings, report);
         self.check_second(now.pressure_pa, seen.second_pa, settings, report);
         self.check_pressure(now.pressure_pa, seen.expected_pa, settings, report);
-        let miss = seen.model_n.map_or(0.0, |model| (model - now.force_n).abs());
-        let apart = settings.force.fitted && watch.disagree_n > 0.0 && miss > watch.disagree_n;
+        let above = seen.model_n.map_or(0.0, |model| model - now.force_n);
+        let (miss, limit) = match watch.disagree_n > 0.0 {
+            true => (above.abs(), watch.disagree_n),
+            false => (above, seen.most_above_n),
+        };
+        let apart = settings.force.fitted && limit > 0.0 && miss > limit;
         if self.disagree.count(apart, watch.disagree_ticks) {
-            let fault = Fault::SensorsDisagree;
-            report(Finding { fault, sensor: None, value: miss, limit: watch.disagree_n });
+            report(Finding { fault: Fault::SensorsDisagree, sensor: None, value: miss, limit });
         }
     }
 

@@ -21,6 +21,8 @@ pub enum Attainability {
     BelowDeadband,
     /// More pressure does not pull harder here (contracted past the neutral angle, or a table that turns round).
     NotRising,
+    /// The demanded force, or that of the muscle, is not a finite number: the pressure is the lowest allowed.
+    NotANumber,
 }
 
 /// A pressure for a force.
@@ -133,17 +135,37 @@ fn solve<T: Scalar>(
             before = if jumps { T::ZERO } else { size };
         }
     };
-    let mut attainability = Attainability::Attainable;
     if !(p > lowest && p < highest && steps < MAX_STEPS) {
-        p = p.at_least(lowest).at_most(highest);
-        attainability = judge(miss, slope, tolerance);
+        let last = Solution {
+            pressure: Pressure::from_pascals(p),
+            slope,
+            attainability: Attainability::Attainable,
+            steps,
+        };
+        return ended(last, miss, search);
     }
-    Solution { pressure: Pressure::from_pascals(p), slope, attainability, steps }
+    Solution { pressure: Pressure::from_pascals(p), slope, attainability: Attainability::Attainable, steps }
+}
+
+/// A search that ended at a limit. One for a force that is not a number goes up to the highest pressure, as each step counts as too little:
+/// its answer is the lowest.
+#[cold]
+#[inline(never)]
+fn ended<T: Scalar>(last: Solution<T>, miss: T, search: &Search<T>) -> Solution<T> {
+    if !miss.is_finite() {
+        return Solution {
+            pressure: search.low,
+            slope: T::ZERO,
+            attainability: Attainability::NotANumber,
+            ..last
+        };
+    }
+    let pressure = last.pressure.si().at_least(search.low.si()).at_most(search.high.si());
+    let attainability = judge(miss, last.slope, search.tolerance.si());
+    Solution { pressure: Pressure::from_pascals(pressure), attainability, ..last }
 }
 
 /// Why a search ended at a limit: by what was missed at its last pressure.
-#[cold]
-#[inline(never)]
 fn judge<T: Scalar>(miss: T, slope: T, tolerance: T) -> Attainability {
     if miss.abs() <= slope.abs() * tolerance * T::from_f32(2.0) {
         Attainability::Attainable

@@ -67,6 +67,17 @@ pub fn slope<T: Scalar>(c: &Cubic<T>, u: T) -> T {
     c[1] + u * (twice + u * thrice)
 }
 
+/// Where a cubic has no slope: `u = (−c₂ ∓ √(c₂² − 3 c₁ c₃)) / (3 c₃)`, without the difference of two nearly equal numbers. Places that it does
+/// not have are not numbers, or not finite.
+#[inline]
+pub fn turns<T: Scalar>(c: &Cubic<T>) -> [T; 2] {
+    let third = c[3] + c[3] + c[3];
+    // No real root is one that is not a number.
+    let root = (c[2] * c[2] - c[1] * third).sqrt();
+    let sum = if c[2] < T::ZERO { root - c[2] } else { -root - c[2] };
+    [sum / third, c[1] / sum]
+}
+
 /// A cubic's value and slope together: Horner's rule and its derivative.
 #[inline(always)]
 pub fn value_and_slope<T: Scalar>(c: &Cubic<T>, u: T) -> (T, T) {
@@ -240,6 +251,28 @@ mod tests {
         for (p, expected) in [(3.3, 7.6), (0.0, 3.0), (9.0, 9.0), (1.0, 3.0), (4.0, 9.0)] {
             assert!((at(&nodes, &values, p) - expected).abs() < 1e-12, "at {p}");
         }
+    }
+
+    #[test]
+    fn a_cubic_turns_where_its_slope_is_nothing() {
+        let cubics = [
+            [1.0, -3.0, 0.0, 1.0],
+            [0.0, 2.0, -3.0, 0.5],
+            [0.0, 2.0, 3.0, 0.5],
+            [0.0, -2.0, 0.5, 0.0],
+            [4.0, 1e-6, -1.0, 1e-9],
+        ];
+        for c in cubics {
+            let mut found = 0;
+            for u in turns(&c).into_iter().filter(|u| u.is_finite()) {
+                let size = c[1].abs() + (2.0 * c[2] * u).abs() + (3.0 * c[3] * u * u).abs();
+                assert!(slope(&c, u).abs() < 1e-12 * size, "{c:?} at {u}");
+                found += 1;
+            }
+            let expected = if c[3] == 0.0 { 1 } else { 2 };
+            assert_eq!(found, expected, "{c:?}");
+        }
+        assert!(turns(&[0.0, 1.0, 0.0, 1.0]).iter().all(|u| !(*u > 0.0)), "a cubic that only rises");
     }
 
     #[test]

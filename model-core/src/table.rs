@@ -3,11 +3,11 @@
 //! It holds values at pressures (nodes), not run-time coefficients; [`crate::muscle::Muscle::build`] turns it into the form that is evaluated.
 //! Every number is an `f32`, so host and controller start from the same bits.
 
-use crate::braid::{self, Geometry, GeometryError};
+use crate::braid::{self, Braid, Geometry, GeometryError};
 use crate::effects::{FittedEffect, MAX_EFFECTS};
 use crate::fields::{codes, fields};
-use crate::spline::MAX_NODES;
-use crate::units::{Force, Pressure};
+use crate::spline::{self, MAX_NODES};
+use crate::units::{Force, Length, Pressure};
 use serde::{Deserialize, Serialize};
 
 /// The largest order `M` of the elastic polynomial.
@@ -87,17 +87,17 @@ pub enum TableError {
     Deadband,
     /// No nodes.
     NoNodes,
-    /// This node is not finite, or not above the one before.
+    /// This node is not finite, or not above the one before by 0.5 % of the range of all.
     Node(u8),
     /// No elastic curve.
     NoOrder,
     /// Curve `k` (from 1) has not one finite value per node, below 10 TPa in size.
     Elastic(u8),
-    /// The friction curve has not one value per node, each between −0.5 and 0.95.
+    /// The friction curve has not one value per node, each between −0.5 and 0.95, or leaves these limits between two nodes.
     Friction,
-    /// The tested range is not finite or is turned round.
+    /// The tested range is not finite, is turned round, or has a contraction at which the sleeve has no shape.
     Tested,
-    /// The greatest pressure is not finite and positive.
+    /// The greatest pressure is not positive, or above 1 GPa.
     MaxPressure,
     /// The blocked force is not a finite number.
     BlockedForce,
@@ -111,14 +111,14 @@ impl core::fmt::Display for TableError {
             Self::Geometry(e) => write!(f, "{e}"),
             Self::Deadband => f.write_str("the deadband P0 is not a pressure between −100 kPa and 1 MPa"),
             Self::NoNodes => f.write_str("the table has no pressure node"),
-            Self::Node(i) => write!(f, "pressure node {} is not finite or not above the one before", i + 1),
+            Self::Node(i) => write!(f, "pressure node {} is not finite, or not above the one before by 0.5 % of their range", i + 1),
             Self::NoOrder => f.write_str("the table has no elastic coefficient"),
             Self::Elastic(k) => write!(f, "E_{k} does not have one finite value per pressure node"),
             Self::Friction => {
-                f.write_str("k_F does not have one value between −0.5 and 0.95 per pressure node")
+                f.write_str("k_F does not have one value between −0.5 and 0.95 per pressure node, or leaves these limits between two nodes")
             }
-            Self::Tested => f.write_str("the tested range is not finite or is turned round"),
-            Self::MaxPressure => f.write_str("the greatest pressure is not finite and positive"),
+            Self::Tested => f.write_str("the tested range is not finite, is turned round, or has a contraction that the muscle cannot have"),
+            Self::MaxPressure => f.write_str("the greatest pressure is not positive, or above 1 GPa"),
             Self::BlockedForce => f.write_str("the blocked force is not a finite number"),
             Self::Effect(i) => {
                 write!(f, "effect {} has a wrong number of parameters or one that is not finite", i + 1)
@@ -159,7 +159,7 @@ impl MuscleTable {
     /// The first number at fault.
     #[inline]
     pub fn check(&self) -> Result<(), TableError> {
-        self.geometry.build().map_err(TableError::Geometry)?;
+        let braid = self.geometry.build().map_err(TableError::Geometry)?;
         let deadband = self.deadband.pascals();
         if !(-1.0e5..=1.0e6).contains(&deadband) {
             return Err(TableError::Deadband);
@@ -167,10 +167,14 @@ impl MuscleTable {
         if self.nodes.is_empty() {
             return Err(TableError::NoNodes);
         }
-        for (i, node) in self.nodes.iter().enumerate() {
-            if !node.is_finite() || (i > 0 && *node <= self.nodes[i - 1]) {
-                return Err(TableError::Node(i as u8));
-            }
+        // Written so that a number that is none is in no range.
+        let wrong = |gap: f32| {
+            let apart = |i: usize| i == 0 || self.nodes[i] - self.nodes[i - 1] >= gap;
+            (0..self.nodes.len()).find(|i| !(self.nodes[*i].abs() <= HIGHEST && apart(*i)))
+        };
+        let span = self.nodes[self.nodes.len() - 1] - self.nodes[0];
+        if let Some(i) = wrong(f32::MIN_POSITIVE).or_else(|| wrong(CLOSEST * span)) {
+            return Err(TableError::Node(i as u8));
         }
         if self.elastic.is_empty() {
             return Err(TableError::NoOrder);
@@ -181,7 +185,8 @@ impl MuscleTable {
                 return Err(TableError::Elastic(k as u8 + 1));
             }
         }
-        if !is_curve(&self.friction, count, -0.5, 0.95) {
+        let (least, most) = FRICTION;
+        if !is_curve(&self.friction, count, least, most) || !stays(&self.nodes, &self.friction, FRICTION) {
             return Err(TableError::Friction);
         }
         let t = &self.tested;
@@ -189,10 +194,12 @@ impl MuscleTable {
         if !all_finite(&[low, high, t.contraction_low, t.contraction_high])
             || low > high
             || t.contraction_low > t.contraction_high
+            || !([0.0, t.contraction_low, t.contraction_high].iter().all(|c| evaluates(&braid, *c)))
         {
             return Err(TableError::Tested);
         }
-        if !(self.max_pressure.is_finite() && self.max_pressure.pascals() > 0.0) {
+        let max_pressure = self.max_pressure.pascals();
+        if !(max_pressure > 0.0 && max_pressure <= HIGHEST) {
             return Err(TableError::MaxPressure);
         }
         if !self.blocked_force.is_finite() {
@@ -212,6 +219,50 @@ impl MuscleTable {
 
 /// The largest elastic coefficient that is taken for one, Pa.
 const STIFFEST: f32 = 1.0e13_f32.next_down();
+
+/// Limits of `k_F`.
+const FRICTION: (f32, f32) = (-0.5, 0.95);
+
+/// Highest pressure that any number of a table may be, Pa: a thousand times what a muscle bears.
+const HIGHEST: f32 = 1.0e9;
+
+/// Least distance of nodes, as a part of their range. Between two that are closer, the noise of a fit is a slope that carries the curve far
+/// beyond its values on both sides: 1 kPa apart in 345 kPa, a `k_F` of 0.14 and 0.12 goes down to −0.33. Levels of a fit are 1 % apart.
+const CLOSEST: f32 = 5.0e-3;
+
+/// Largest area, m², and strain at a contraction of the tested range: a thousand times and a hundred times those of any muscle. With them, with
+/// [`STIFFEST`] and [`HIGHEST`] every term of the force is below 10³², which leaves room for curves that go beyond their values.
+const WIDEST: f32 = 1.0e6;
+const MOST_STRAINED: f32 = 100.0;
+
+/// Whether the sleeve at a contraction has a shape, and with it forces that are numbers: for a contraction of the tested range.
+#[inline(never)]
+fn evaluates(braid: &Braid<f32>, contraction: f32) -> bool {
+    let posture = braid.posture(Length::from_metres(contraction * braid.rest_length()));
+    let areas = [posture.area, posture.axial_area, posture.hoop_area];
+    let strains = [posture.axial_strain, posture.radial_strain];
+    contraction >= -1.0
+        && posture.length > 0.0
+        && posture.load_length > 0.0
+        && areas.iter().all(|area| area.abs() <= WIDEST)
+        && strains.iter().all(|strain| strain.abs() <= MOST_STRAINED)
+}
+
+/// Whether a curve stays between two limits from each node to the next, where its values at the nodes do.
+#[inline(never)]
+fn stays(nodes: &[f32], values: &[f32], (low, high): (f32, f32)) -> bool {
+    let mut stays = true;
+    spline::natural_cubic(nodes, values, &mut |n, cubic| {
+        let end = nodes[n + 1] - nodes[n];
+        for turn in spline::turns(&cubic) {
+            if turn > 0.0 && turn < end {
+                let value = spline::value(&cubic, turn);
+                stays &= value >= low && value <= high;
+            }
+        }
+    });
+    stays
+}
 
 fn all_finite(values: &[f32]) -> bool {
     is_curve(values, values.len(), f32::MIN, f32::MAX)
@@ -295,8 +346,8 @@ mod tests {
             (TableError::Elastic(3), -STIFFEST, STIFFEST, |t, v| t.elastic[2][5] = v),
             (TableError::Friction, -0.5, 0.95, |t, v| t.friction[5] = v),
             (TableError::Tested, f32::MIN, 552e3, |t, v| t.tested.pressure_low = Pressure::from_pascals(v)),
-            (TableError::Tested, f32::MIN, 0.077, |t, v| t.tested.contraction_low = v),
-            (TableError::MaxPressure, 0.0_f32.next_up(), f32::MAX, |t, v| {
+            (TableError::Tested, -1.0, 0.077, |t, v| t.tested.contraction_low = v),
+            (TableError::MaxPressure, 0.0_f32.next_up(), HIGHEST, |t, v| {
                 t.max_pressure = Pressure::from_pascals(v);
             }),
         ];
@@ -311,6 +362,51 @@ mod tests {
                 assert_eq!(with(value), Err(error), "{value}");
             }
         }
+    }
+
+    #[test]
+    fn nodes_that_are_too_close_and_curves_that_leave_their_limits_between_nodes_are_refused() {
+        let with = |change: &dyn Fn(&mut MuscleTable)| {
+            let mut t = example();
+            change(&mut t);
+            t.check()
+        };
+        let gap = |pascals: f32| with(&|t| t.nodes[1] = t.nodes[0] + pascals);
+        assert_eq!(gap(5e3), Ok(()));
+        assert_eq!([gap(1e3), gap(200.0)], [Err(TableError::Node(1)); 2]);
+        // All values are within the limits; between them the curve goes to −0.7 and 1.15.
+        assert_eq!(
+            with(&|t| t.friction = [0.0, 0.0, 0.9, -0.5, -0.5, 0.9].into_iter().collect()),
+            Err(TableError::Friction)
+        );
+        assert_eq!(with(&|t| t.friction = [0.0, 0.0, 0.4, 0.4, 0.0, 0.0].into_iter().collect()), Ok(()));
+    }
+
+    #[test]
+    fn numbers_of_which_no_force_could_be_computed_are_refused() {
+        let with = |change: &dyn Fn(&mut MuscleTable)| {
+            let mut t = example();
+            change(&mut t);
+            t.check()
+        };
+        let length = Length::from_metres;
+        let diameter = Err(TableError::Geometry(GeometryError::OuterDiameter));
+        assert_eq!(with(&|t| t.geometry.outer_diameter = length(1e30)), diameter);
+        assert_eq!(
+            with(&|t| t.geometry.rest_length = length(1e20)),
+            Err(TableError::Geometry(GeometryError::RestLength))
+        );
+        assert_eq!(
+            with(&|t| (t.geometry.outer_diameter, t.geometry.wall) = (length(1e-38), length(1e-39))),
+            diameter
+        );
+        // Fibres that are nearly axial widen a hundred times as the muscle contracts.
+        assert_eq!(
+            with(&|t| t.geometry.braid_angle = crate::units::Angle::from_radians(1.57)),
+            Err(TableError::Tested)
+        );
+        assert_eq!(with(&|t| t.tested.contraction_high = 1.0), Err(TableError::Tested));
+        assert_eq!(with(&|t| t.nodes[5] = 1e38), Err(TableError::Node(5)));
     }
 
     #[test]

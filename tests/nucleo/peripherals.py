@@ -509,21 +509,25 @@ class Uart(Registers):
 
 
 class Watchdog(Registers):
-    """Independent watchdog (chapter 20): another time is taken over five periods of its oscillator later."""
+    """Independent watchdog (chapter 20): another time is taken over five periods of its divided oscillator later, and none is while it is."""
 
     OSCILLATOR = 32e3
+    PRESCALER, RELOAD = 0x04, 0x08
 
     def __init__(self, chip):
         super().__init__(chip)
         self.words[0x08] = 0xFFF
         self.reload, self.divider = 0xFFF, 4
         self.runs, self.open, self.turn = False, False, 0
-        self.busy_until = 0.0
+        self.busy_until = {self.PRESCALER: 0.0, self.RELOAD: 0.0}
         self.fed = 0
+
+    def busy(self, offset):
+        return self.chip.now < self.busy_until[offset]
 
     def read(self, offset):
         if offset == 0x0C:
-            return 3 if self.chip.now < self.busy_until else 0
+            return int(self.busy(self.PRESCALER)) | int(self.busy(self.RELOAD)) << 1
         return self.get(offset)
 
     def write(self, offset, value):
@@ -535,13 +539,19 @@ class Watchdog(Registers):
             if value == 0xAAAA:
                 self.fed += 1
                 self.feed()
-        elif self.open:
+        elif self.open and not self.busy(offset):
             self.words[offset] = value
-            self.busy_until = self.chip.now + 5 / self.OSCILLATOR
-            self.chip.at(self.busy_until, self.take_over)
+            self.busy_until[offset] = self.chip.now + 5 * self.divides() / self.OSCILLATOR
+            self.chip.at(self.busy_until[offset], self.take_over)
+
+    def divides(self):
+        return 4 << (self.get(self.PRESCALER) & 7)
 
     def take_over(self):
-        self.reload, self.divider = self.get(0x08), 4 << (self.get(0x04) & 7)
+        if not self.busy(self.RELOAD):
+            self.reload = self.get(self.RELOAD)
+        if not self.busy(self.PRESCALER):
+            self.divider = self.divides()
 
     def feed(self):
         self.turn += 1

@@ -368,6 +368,25 @@ class Failures(unittest.TestCase):
         self.assertEqual(board.link.status()["fault"], "brown-out")
         self.assertTrue(chip.valve_open)
 
+    def test_a_supply_that_falls_during_a_step_is_not_answered_by_closing_the_valve_again(self):
+        for microseconds in (3, 6, 9):
+            board = self.running()
+            chip = board.chip
+
+            def in_section(chip=chip):
+                return chip.uc.reg_read(board_registers()["basepri"]) != 0
+
+            # The control step is by far the longest critical section.
+            for _ in range(100):
+                self.assertTrue(chip.run(0.01, in_section))
+                chip.run(microseconds * 1e-6)
+                if in_section():
+                    break
+            chip.power.sag(True)
+            self.assert_vented_within(board, 5e-6)
+            self.assertFalse(chip.run(0.002, lambda: not chip.valve_open), "the valve closes again")
+            self.assertEqual(board.link.status()["fault"], "brown-out")
+
     def test_a_converter_that_is_silent_vents_within_three_ticks(self):
         board = self.running()
         board.chip.adc.fails = True

@@ -1,24 +1,32 @@
 //! One muscle at work: its table, its readings, its loops and its regulator.
 
-use model_core::link::messages::SideSample;
+use model_core::link::messages::{Fault, Sensor, SideSample};
 use model_core::link::settings::Settings;
 use model_core::motion::MotionTracker;
 use model_core::scalar::Scalar;
 
 use super::motion_settings;
+use super::standing::Standing;
 use crate::board::{Command, Hardware, Readings};
 use crate::health::{Health, Sample};
 use crate::modes::{Integral, Model, Seat};
 use crate::regulator::{Air, Bounds, Law, RegulatorState};
-use crate::signals::{Filters, Sums};
-use crate::valves::{PairOfValves, Valves};
-use crate::watch::{Seen, SideWatch};
+use crate::signals::{Filters, Speed, Sums};
+use crate::valves::{PairOfValves, Valves, Volume};
+use crate::watch::{Finding, Seen, SideWatch};
+
+/// Ticks after a reading that was false in which none is remembered: as many as a fault may wait for the next good one.
+const DOUBT_TICKS: u8 = 20;
 
 /// One muscle at work.
 #[derive(Debug)]
 pub(super) struct Actuator {
     pub(super) model: Seat,
     pub(super) motion: MotionTracker<f32>,
+    /// Speed of the stroke before its filter.
+    pub(super) unfiltered: Speed,
+    /// Ticks for which no reading is remembered after one that was false.
+    pub(super) doubt: u8,
     pub(super) watch: SideWatch,
     pub(super) regulator: RegulatorState,
     /// The valves in place of a regulator.
@@ -45,6 +53,8 @@ pub(super) struct Actuator {
     pub(super) model_n: Option<f32>,
     /// The load cell against the table.
     pub(super) health: Health,
+    /// Where the stroke has stood still.
+    pub(super) standing: Standing,
 }
 
 impl Actuator {
@@ -53,6 +63,8 @@ impl Actuator {
         Self {
             model,
             motion: MotionTracker::new(motion_settings(settings)),
+            unfiltered: Speed::default(),
+            doubt: 0,
             watch: SideWatch::default(),
             regulator: RegulatorState::default(),
             valves: PairOfValves::default(),
@@ -72,20 +84,33 @@ impl Actuator {
             trim_pa: 0.0,
             model_n: None,
             health: Health::default(),
+            standing: Standing::default(),
         }
     }
 
     /// What the watches look at.
     #[inline(always)]
-    pub(super) fn seen(&self) -> Seen {
+    pub(super) fn seen(&self, most_above_n: f32, settings: &Settings) -> Seen {
+        let filters = settings.scales.stroke.filter_s > 0.0;
         Seen {
             readings: self.readings,
             second_pa: self.second_pa,
-            speed_m_per_s: self.motion.motion().speed,
+            speed_m_per_s: if filters { self.unfiltered.speed() } else { self.motion.motion().speed },
             command: self.command,
             expected_pa: self.regulator.model_pa(),
             model_n: self.model_n,
+            most_above_n,
         }
+    }
+
+    /// Whether what is read may be remembered: it is within the ranges of its sensors, and has not jumped within the longest glitch.
+    pub(super) fn trusts(&mut self, now: &Readings, settings: &Settings) -> bool {
+        if !self.watch.may_be(now, settings) {
+            self.doubt = DOUBT_TICKS;
+            return false;
+        }
+        self.doubt = self.doubt.saturating_sub(1);
+        self.doubt == 0
     }
 
     /// Lets the air out, and nothing of what was demanded stays.
@@ -117,7 +142,25 @@ impl Actuator {
         // Without a reading in this tick nothing is known of the pressure.
         let measured_pa = if self.readings.is_some() { self.sample.pressure_pa } else { f32::NAN };
         let air = self.air();
-        self.valves.step(&self.command, measured_pa, &air, settings)
+        let volume = match (self.present(), settings.stroke.fitted) {
+            (Some(_), _) => Volume::Known,
+            (None, true) => Volume::Still(self.sample.stroke_m),
+            (None, false) => Volume::Still(f32::NAN),
+        };
+        self.valves.step(&self.command, measured_pa, &air, volume, settings)
+    }
+
+    /// The pair of valves fills, and the reading of the pressure does not answer.
+    #[inline(always)]
+    pub(super) fn unanswered(&self) -> Option<Finding> {
+        let unseen_pa = self.valves.unanswered_pa()?;
+        let value = self.sample.pressure_pa;
+        Some(Finding {
+            fault: Fault::PressureNotRising,
+            sensor: Some(Sensor::Pressure),
+            value,
+            limit: value + unseen_pa,
+        })
     }
 
     /// Limits by settings, board and table, of which one has changed.

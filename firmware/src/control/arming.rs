@@ -67,6 +67,7 @@ impl Controller {
             if self.settings.pressure.fitted && watch.valve_test_pa > 0.0 {
                 if self.arming == Arming::Idle {
                     self.arming = Arming::Filling(0);
+                    self.tested = [true, self.sides[1].readings.is_some()];
                 }
                 self.own(session);
                 return Ok(());
@@ -102,7 +103,7 @@ impl Controller {
         Ok(())
     }
 
-    /// One tick of the test, on every muscle that has readings.
+    /// One tick of the test, on the first muscle and on every other that has had readings since it began.
     pub(super) fn test_valves(&mut self) {
         let regulator = self.settings.regulator;
         let pressure_pa = self.settings.watch.valve_test_pa;
@@ -116,12 +117,23 @@ impl Controller {
         };
         let mut waits_for = None;
         for side in Side::ALL {
-            let Some(now) = self.sides[side.index()].readings else { continue };
+            let Some(now) = self.sides[side.index()].readings else {
+                // What is not read in this tick decides nothing, and the time goes on.
+                if self.tested[side.index()] {
+                    waits_for = waits_for.or(Some((side, self.sides[side.index()].sample.pressure_pa)));
+                }
+                continue;
+            };
+            self.tested[side.index()] = true;
             // More than twice the commanded pressure: the scale of the sensor or of the command is wrong.
             let most_pa = MOST * pressure_pa;
             if !(now.pressure_pa <= most_pa) {
                 let (fault, value) = (Fault::ValveTest, now.pressure_pa);
                 return self.raise(side, &Finding { fault, sensor: None, value, limit: most_pa });
+            }
+            // A pair of valves fills, and no pressure answers.
+            if let Some(finding) = self.sides[side.index()].unanswered() {
+                return self.raise(side, &Finding { fault: Fault::ValveTest, ..finding });
             }
             let filled = now.pressure_pa >= enough_pa && !(filling && early);
             if filled != filling {

@@ -21,7 +21,11 @@ impl Controller {
                     (Demand { pressure_pa: self.lookahead, lookahead_pa: self.lookahead_step }, true);
             }
             Mode::Force => {
-                demands[0] = self.demand_for_force(0, [self.setpoint, self.lookahead], self.lookahead_step)
+                demands[0] = if let Some(pressure_pa) = self.slack_since_start() {
+                    (Demand { pressure_pa, lookahead_pa: 0.0 }, true)
+                } else {
+                    self.demand_for_force(0, [self.setpoint, self.lookahead], self.lookahead_step)
+                }
             }
             Mode::Stroke => {
                 let side = &mut self.sides[0];
@@ -58,6 +62,13 @@ impl Controller {
         if let Some((side, value)) = bad {
             self.raise(side, &Finding { fault: Fault::NotANumber, sensor: None, value, limit: 0.0 });
         }
+    }
+
+    /// The pressure of a muscle that was slack when force mode was started, until there is an order. The table gives no force as the pressure
+    /// at which the muscle would just be taut, and a start moves nothing.
+    fn slack_since_start(&self) -> Option<f32> {
+        let taut_n = self.sides[0].model.as_ref()?.taut_n();
+        self.begun_pa.filter(|_| self.setpoint <= taut_n)
     }
 
     /// Makes the command of one muscle; fails with a demand or a command that cannot be sent.
@@ -107,6 +118,10 @@ impl Controller {
         [force_n, coming_n]: [f32; 2],
         foreseen_n: f32,
     ) -> (Demand, bool) {
+        // Limits and inverse would make a pressure of it.
+        if !(force_n.is_finite() && coming_n.is_finite()) {
+            return (Demand { pressure_pa: f32::NAN, lookahead_pa: 0.0 }, false);
+        }
         let settings = in_register(&self.settings);
         let actuator = &mut self.sides[at];
         actuator.force_demand_n = force_n;

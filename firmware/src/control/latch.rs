@@ -18,7 +18,7 @@ impl Controller {
         self.trace.on_fault();
         self.held_ticks = 0;
         // A fault of a start that never ran leaves nothing pressurised.
-        let vents = safety::reaction(finding.fault, self.settings.hold_on) == Reaction::Vent;
+        let vents = safety::reaction(finding.fault, self.hold_on()) == Reaction::Vent;
         if vents || report.from != State::Running || self.settings.watch.hold_ticks == 0 {
             self.vent_now();
         }

@@ -8,7 +8,7 @@ use super::arming::Arming;
 use super::{Controller, in_register};
 use crate::board::Inputs;
 use crate::safety;
-use crate::watch::Finding;
+use crate::watch::{Finding, Seen};
 
 /// Faults that were found in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,17 +34,23 @@ impl Found {
 /// All watches of a muscle. Apart from a calm tick, which needs nothing of it.
 #[cold]
 #[inline(never)]
-fn check(actuator: &mut Actuator, settings: &Settings, report: &mut dyn FnMut(Finding)) {
-    let seen = actuator.seen();
-    actuator.watch.check(&seen, settings, report);
+fn check(actuator: &mut Actuator, seen: &Seen, settings: &Settings, report: &mut dyn FnMut(Finding)) {
+    actuator.watch.check(seen, settings, report);
 }
 
 impl Controller {
+    /// The faults that hold, as bits. A pair of valves goes on filling while a command is held: where the pressure does not answer, it is not.
+    pub(super) fn hold_on(&self) -> u32 {
+        let settings = &self.settings;
+        let never = if settings.valves.is_fitted() { 1 << Fault::PressureNotRising.code() } else { 0 };
+        settings.hold_on & !never
+    }
+
     /// What is a fault in the present state. A muscle that the running mode does not use is watched as if disarmed. While valves are tested
     /// the device is watched as if armed: it is disarmed, but its muscles are under pressure.
     pub(super) fn watch(&mut self, inputs: &Inputs) -> Found {
         let mut found = Found::default();
-        let hold_on = self.settings.hold_on;
+        let hold_on = self.hold_on();
         let state = match self.machine.state() {
             State::Disarmed if self.arming != Arming::Idle => State::Armed,
             state => state,
@@ -58,6 +64,7 @@ impl Controller {
                 found.venting = found.venting.or(Some((side, finding)));
             }
         };
+        let relies = state == State::Running && matches!(self.mode, Mode::Stroke | Mode::Pair);
         for side in Side::ALL {
             let used = self.uses(side);
             let Self { sides, settings, .. } = self;
@@ -66,12 +73,22 @@ impl Controller {
             if !used && readings.is_none() {
                 continue;
             }
-            let seen = actuator.seen();
+            if let Some(finding) = actuator.unanswered() {
+                note(side, if used { state } else { State::Disarmed }, finding);
+            }
+            let mut most_above_n = 0.0;
+            if relies && used {
+                most_above_n = actuator.half_blocked_n();
+                if let Some(finding) = actuator.stands(self.mode, settings) {
+                    note(side, state, finding);
+                }
+            }
+            let seen = actuator.seen(most_above_n, settings);
             if actuator.watch.pass(&seen, settings) {
                 continue;
             }
             let state = if used { state } else { State::Disarmed };
-            check(actuator, settings, &mut |finding| note(side, state, finding));
+            check(actuator, &seen, settings, &mut |finding| note(side, state, finding));
         }
         let mut note = |fault, value, limit| {
             note(Side::Agonist, state, Finding { fault, sensor: None, value, limit });

@@ -8,6 +8,7 @@ use model_core::link::settings::{FeedForward, Settings};
 
 use super::actuator::Actuator;
 use super::arming::Arming;
+use super::standing::Standing;
 use super::{Controller, Notice};
 use crate::board::Command;
 use crate::pair::{self, Arm};
@@ -34,7 +35,8 @@ impl Controller {
     ///
     /// # Errors
     /// As [`Machine::request`](crate::safety::Machine::request); [`Refusal::OtherSession`] where another session owns the device and
-    /// is not silent; [`Refusal::NoTable`], with the fault latched, where the mode needs a table.
+    /// is not silent; [`Refusal::NoTable`], with the fault latched, where the mode needs a table; [`Refusal::Value`] where it needs a
+    /// stroke sensor and the settings have none.
     pub fn start(&mut self, mode: Mode, session: Session) -> Result<(), Refusal> {
         self.machine.allows(Cause::Start)?;
         self.may_take(session)?;
@@ -48,6 +50,10 @@ impl Controller {
             let none = Finding { fault: Fault::TableMissing, sensor: None, value: 0.0, limit: 1.0 };
             self.raise(side, &none);
             return Err(Refusal::NoTable(side));
+        }
+        // A loop of the stroke over a sensor that is not there would fill the muscle until something else stops it.
+        if matches!(mode, Mode::Stroke | Mode::Pair) && !self.settings.stroke.fitted {
+            return Err(Refusal::Value(Field::SensorWatch));
         }
         let continues = self.machine.state() == State::Running;
         self.change(Cause::Start)?;
@@ -65,6 +71,7 @@ impl Controller {
             Mode::Pair => (first.stroke_m - self.sides[1].sample.stroke_m) / (2.0 * joint.radius_m),
         };
         self.setpoint_age = 0;
+        self.begun_pa = Some(first.pressure_pa.max(0.0));
         for side in &mut self.sides {
             match (continues, side.command.vent) {
                 (true, false) => {}
@@ -78,6 +85,7 @@ impl Controller {
             side.stroke_loop.reset();
             side.guess_pa = side.sample.pressure_pa;
             side.saturation = 0.0;
+            side.standing = Standing::default();
         }
         if mode == Mode::Pair
             && let Some(arms) = self.arms()
@@ -203,6 +211,7 @@ impl Controller {
         self.generator.begin(Reference::SetPoint)?;
         (self.setpoint, self.setpoint_second) = (asked, second);
         self.setpoint_age = 0;
+        self.begun_pa = None;
         Ok(())
     }
 
@@ -251,6 +260,7 @@ impl Controller {
         // Here, so that no tick has all of it to do.
         self.generator.look_ahead(self.law.ahead());
         self.setpoint_age = 0;
+        self.begun_pa = None;
         self.trace.on_start();
         Ok(())
     }

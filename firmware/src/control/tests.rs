@@ -17,6 +17,7 @@ mod recorded;
 mod refusals;
 mod repeated;
 mod silences;
+mod standing;
 mod tracking;
 mod valve_test;
 mod valves;

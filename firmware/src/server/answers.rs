@@ -191,12 +191,12 @@ impl<F: NorFlash> Service for Answers<'_, F> {
         match kept {
             Ok(selected) => *answer = selected.info(),
             Err(refusal) => {
-                // The table before stays the one in use.
-                let _ = self.server.use_kept(side, self.shared);
+                // The table before stays the one in use. If it cannot be read either, there is none, and a fault says so.
+                let _ = self.server.use_again(side, self.shared);
                 return Err(refusal);
             }
         }
-        self.server.use_kept(side, self.shared)
+        self.server.use_again(side, self.shared)
     }
 
     fn table_read(&mut self, request: &TableRead, answer: &mut TablePiece) -> Result<(), Refusal> {
@@ -211,7 +211,7 @@ impl<F: NorFlash> Service for Answers<'_, F> {
         self.at_rest()?;
         let RollBack { side, generation } = *request;
         *answer = self.server.store.roll_back(side, generation).map_err(Refusal::Store)?.info();
-        self.server.use_kept(side, self.shared)
+        self.server.use_again(side, self.shared)
     }
 
     fn evaluate(&mut self, request: &Evaluate, answer: &mut Evaluated) -> Result<(), Refusal> {
@@ -262,7 +262,7 @@ impl<F: NorFlash> Service for Answers<'_, F> {
     fn forget_memory(&mut self, request: &ForgetMemory, (): &mut ()) -> Result<(), Refusal> {
         self.at_rest()?;
         self.server.store.put_memories(request.side, 0, &|_| Memory::default()).map_err(Refusal::Store)?;
-        self.server.use_kept(request.side, self.shared)
+        self.server.use_again(request.side, self.shared)
     }
 
     fn restart(&mut self, (): &(), (): &mut ()) -> Result<(), Refusal> {

@@ -4,7 +4,7 @@ use model_core::link::messages::{Mode, SideSample, State};
 use model_core::link::settings::Settings;
 
 use super::mock_flash::MockFlash;
-use super::tests::{cut_everywhere, kept, open, place_of, settings_of, table};
+use super::tests::{counted, cut_everywhere, kept, open, place_of, settings_of, table};
 use super::*;
 
 /// What [`written`] keeps.
@@ -37,7 +37,7 @@ fn written() -> MockFlash {
     store.put_settings(&mut settings).expect("room");
     store.put_memories(Side::Agonist, 2, &|position| memories()[position]).expect("room");
     store.put_fault(&mut report()).expect("room");
-    store.count_start().expect("room");
+    counted(&mut store);
     store.close()
 }
 
@@ -79,7 +79,7 @@ fn stored_data_of_this_format_are_read_and_written_alike() {
     store.each_memory(Side::Agonist, &mut |_, one| remembered.push(*one)).expect("readable");
     assert_eq!(remembered, memories());
     assert_eq!(store.past_fault(0), Ok(Some(report())));
-    assert_eq!(store.count_start(), Ok(2));
+    assert_eq!(counted(&mut store), 2);
 }
 
 /// Flashes that older firmware wrote: settings are taken over field by field, those that it did not know are the board's own. Tables,
@@ -116,7 +116,7 @@ fn settings_of_older_formats_are_taken_over_field_by_field() {
         assert_eq!(settings.can.address, 7);
         assert_eq!(kept(&mut store, Side::Agonist).as_deref(), Some(&table(2)[..]));
         assert_eq!(store.past_fault(0), Ok(Some(report())));
-        assert_eq!(store.count_start(), Ok(2));
+        assert_eq!(counted(&mut store), 2);
         store.put_settings(&mut settings).expect("room");
         assert_eq!(settings_of(&mut store), Some(settings));
     }

@@ -12,13 +12,15 @@ const WORD: usize = 4;
 /// Flash in memory that counts its words and erases, and loses power after some of them.
 #[derive(Clone, Debug)]
 pub(crate) struct MockFlash {
-    pub(super) bytes: Vec<u8, { PAGE * PAGES }>,
+    pub(crate) bytes: Vec<u8, { PAGE * PAGES }>,
     /// Words that may still be written (an erase of a page counts as one).
     left: usize,
     pub(super) done: usize,
     pub(super) off: bool,
     /// Writes that still work, where the flash wears out and is read all the same.
     lasts: usize,
+    /// Writes that fail, before all others work.
+    fails: usize,
     /// What a cut leaves of the word or page it hits: 0 nothing happened, 1 half, 2 all of it.
     tear: usize,
     /// The word, counted from now, of which a bit is written wrongly.
@@ -38,7 +40,22 @@ impl MockFlash {
     pub(crate) fn erased() -> Self {
         let mut bytes = Vec::new();
         bytes.resize(PAGE * PAGES, 0xFF).expect("its own size");
-        Self { bytes, left: usize::MAX, done: 0, off: false, lasts: usize::MAX, tear: 0, wrong: usize::MAX }
+        Self {
+            bytes,
+            left: usize::MAX,
+            done: 0,
+            off: false,
+            lasts: usize::MAX,
+            fails: 0,
+            tear: 0,
+            wrong: usize::MAX,
+        }
+    }
+
+    /// The same under a supply that sags: the next n writes fail.
+    pub(crate) fn failing_first(mut self, writes: usize) -> Self {
+        self.fails = writes;
+        self
     }
 
     /// The same worn out: n more writes work, and everything is read.
@@ -124,6 +141,10 @@ impl NorFlash for MockFlash {
             return Err(PowerCut);
         }
         self.lasts = self.lasts.saturating_sub(1);
+        if self.fails > 0 {
+            self.fails -= 1;
+            return Err(PowerCut);
+        }
         for (n, word) in bytes.chunks(WORD).enumerate() {
             if self.off {
                 return Err(PowerCut);

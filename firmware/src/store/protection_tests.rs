@@ -105,3 +105,16 @@ fn memories_of_another_generation_are_not_given_out() {
     assert_eq!(count(&mut store), 2, "its own table again");
     assert_eq!(store.each_memory(Side::Antagonist, &mut |_, _| ()), Ok(0), "the other muscle");
 }
+
+#[test]
+fn a_new_table_has_a_generation_that_nothing_kept_has() {
+    let mut store = used(3);
+    store.put_memories(Side::Agonist, 1, &|_| [1.5; MEMORY]).expect("room");
+    let newest = store.roll_back(Side::Agonist, 3).expect("there is one").previous.expect("the newer one");
+    assert_eq!(newest.generation, 3);
+    assert_eq!(store.commit(Side::Agonist, &table(7)).map(|now| now.table.generation), Ok(4));
+    // The selection is lost with its item, the memories are not.
+    store.put_bytes(SELECTED, &[]).expect("room");
+    assert_eq!(store.commit(Side::Agonist, &table(8)).map(|now| now.table.generation), Ok(4));
+    assert_eq!(store.each_memory(Side::Agonist, &mut |_, _| panic!("of another table")), Ok(0));
+}

@@ -3,7 +3,8 @@
 //! The map below gives out the last item of a key whose own check sum is right: if the newest is damaged, that is the one before,
 //! silently. Limits of before, or none, must not come into force unseen, so a seal in an item of its own says which settings are to
 //! be expected: the sum of their bytes. While they are being written it names the old and the new, so that a power cut leaves either.
-//! A device writes its settings at its very first start; where the layout's number is kept and no settings are, they are lost.
+//! A device writes its settings at its very first start; where the layout's number is kept and no settings are, they are lost. A store
+//! that had to be erased therefore begins with that number.
 
 use embedded_storage_async::nor_flash::NorFlash;
 use model_core::check::crc32;
@@ -227,8 +228,15 @@ impl<F: NorFlash> Store<F> {
         self.put_bytes(SETTINGS, bytes)?;
         self.put_value(SEAL, &mut Seal { current, previous: None })?;
         if self.value::<u16>(LAYOUT)? != Some(FORMAT) {
-            self.put_value(LAYOUT, &mut { FORMAT })?;
+            self.put_layout()?;
         }
         if self.bytes(SETTINGS)? == Some(bytes) { Ok(()) } else { Err(StoreFault::Verify) }
+    }
+    /// Marks the flash as a store of this layout: without settings, they are lost.
+    ///
+    /// # Errors
+    /// As the medium fails.
+    pub(super) fn put_layout(&mut self) -> Result<(), StoreFault> {
+        self.put_value(LAYOUT, &mut { FORMAT })
     }
 }

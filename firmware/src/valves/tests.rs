@@ -25,7 +25,7 @@ impl Bench {
         let muscle = &mut self.muscle;
         let widening_per_s = (muscle.widening / muscle.volume) as f32;
         let air = Air { fill: muscle.volume as f32, widening_per_s };
-        let done = self.pair.step(command, muscle.pressure_pa() as f32, &air, &self.settings);
+        let done = self.pair.step(command, muscle.pressure_pa() as f32, &air, Volume::Known, &self.settings);
         muscle.pass(done);
         done
     }
@@ -195,7 +195,13 @@ fn a_reading_that_is_no_number_closes_both_and_no_command_vents() {
         let step = |pressure_pa: f32, air: Air| {
             let mut settings = Settings::default();
             settings.valves.period_ticks = 10;
-            PairOfValves::default().step(&Command { pressure_pa, vent: false }, wrong, &air, &settings)
+            PairOfValves::default().step(
+                &Command { pressure_pa, vent: false },
+                wrong,
+                &air,
+                Volume::Known,
+                &settings,
+            )
         };
         let moving = Air { widening_per_s: -0.5, ..Air::default() };
         for air in [Air::default(), moving] {
@@ -212,8 +218,13 @@ fn a_reading_that_is_no_number_closes_both_and_no_command_vents() {
         bench.hold(300e3, 1_000);
         let air = Air { fill: wrong, widening_per_s: wrong };
         bench.pair.left = 0;
-        let done =
-            bench.pair.step(&Command { pressure_pa: 400e3, vent: false }, 300e3, &air, &bench.settings);
+        let done = bench.pair.step(
+            &Command { pressure_pa: 400e3, vent: false },
+            300e3,
+            &air,
+            Volume::Known,
+            &bench.settings,
+        );
         assert_eq!(done, Valves::Period { fill_us: 0, vent_us: 0, length_us: 10_000 }, "air of {wrong}");
     }
 }
@@ -229,5 +240,69 @@ fn without_a_pair_there_is_nothing_to_do() {
 fn the_flow_is_that_of_the_standard() {
     for (ratio, part) in [(0.0, 1.0), (0.3, 1.0), (0.65, 0.866_025_4), (1.0, 0.0), (1.2, 0.0)] {
         assert!((flow(ratio) - part).abs() < 1e-6, "{} at {ratio}", flow(ratio));
+    }
+}
+
+/// Steps, ramps, waves, leaks and motions of a real muscle, whose valves and volume are not what the settings say: the pressure answers.
+#[test]
+fn a_muscle_that_answers_is_never_taken_for_one_that_does_not() {
+    type Change = fn(&mut Settings, &mut Muscle);
+    let changes: [(&str, Change); 8] = [
+        ("as its settings say", |_, _| ()),
+        ("four times as large", |_, m| m.volume = 4.0),
+        ("a third as large", |_, m| m.volume = 0.33),
+        ("slow fill valve", |s, _| s.valves.fill_pa_per_s *= 2.0),
+        ("slow vent valve", |s, _| s.valves.vent_pa_per_s *= 2.0),
+        ("long periods", |s, _| (s.valves.period_ticks, s.regulator.lag_s) = (50, 0.1)),
+        ("short periods", |s, _| s.valves.period_ticks = 4),
+        // 10 kPa/s at 300 kPa.
+        ("a leak", |_, m| m.leak = 10e3 * REST / (GAS_J_PER_MOL_K * AIR_K * 300e3)),
+    ];
+    for (name, change) in changes {
+        let mut bench = Bench::new(|_| ());
+        change(&mut bench.settings, &mut bench.muscle);
+        for tick in 0..20_000_u32 {
+            let t = 1e-3 * tick as f32;
+            let pressure_pa = match tick / 1_000 {
+                0..4 => [300e3, 500e3, 150e3, 600e3][(tick / 1_000) as usize],
+                4..8 => 300e3 + 3e3 * (50.0 * t).sin(),
+                8..12 => 350e3 + 200e3 * (6.0 * t).sin(),
+                12..16 => 100e3 + 100e3 * (t - 12.0),
+                _ => 300e3,
+            };
+            // The air that the controller knows of is that of a muscle at rest.
+            let noise = 300.0 * (tick as f32 * 12.9898).sin();
+            let measured = bench.muscle.pressure_pa() as f32 + noise;
+            let command = Command { pressure_pa, vent: false };
+            let done =
+                bench.pair.step(&command, measured, &Air::default(), Volume::Still(0.0), &bench.settings);
+            bench.muscle.pass(done);
+            assert_eq!(bench.pair.unanswered_pa(), None, "{name}, at {t} s");
+        }
+    }
+}
+
+/// A muscle that a machine stretches and releases once a second, up to twice its volume, at constant pressure.
+#[test]
+fn the_air_that_a_moving_muscle_takes_needs_no_answer() {
+    for known in [true, false] {
+        let mut bench = Bench::new(|s| (s.valves.fill_pa_per_s, s.valves.vent_pa_per_s) = (6e6, 6e6));
+        // The valves give two thirds of what the settings say.
+        (bench.settings.valves.fill_pa_per_s, bench.settings.valves.vent_pa_per_s) = (9e6, 9e6);
+        for tick in 0..10_000_u32 {
+            let t = 1e-3 * f64::from(tick);
+            let swing = core::f64::consts::TAU * t;
+            bench.muscle.volume = 1.5 - 0.5 * swing.cos();
+            let widening = 0.5 * core::f64::consts::TAU * swing.sin() / bench.muscle.volume;
+            let air = Air { fill: bench.muscle.volume as f32, widening_per_s: widening as f32 };
+            let stroke_m = (1.5e-3 - 1.5e-3 * swing.cos()) as f32;
+            let (air, volume) =
+                if known { (air, Volume::Known) } else { (Air::default(), Volume::Still(stroke_m)) };
+            let command = Command { pressure_pa: 300e3, vent: false };
+            let done =
+                bench.pair.step(&command, bench.muscle.pressure_pa() as f32, &air, volume, &bench.settings);
+            bench.muscle.pass(done);
+            assert_eq!(bench.pair.unanswered_pa(), None, "known: {known}, at {t} s");
+        }
     }
 }

@@ -79,6 +79,7 @@ impl SideWatch {
         if has_force {
             let agrees = match seen.model_n {
                 Some(model_n) if watch.disagree_n > 0.0 => (model_n - now.force_n).abs() <= watch.disagree_n,
+                Some(model_n) if seen.most_above_n > 0.0 => model_n - now.force_n <= seen.most_above_n,
                 _ => true,
             };
             if !(agrees

@@ -14,6 +14,7 @@ fn good() -> Seen {
         command: Command { pressure_pa: 200e3, vent: false },
         expected_pa: 200e3,
         model_n: Some(41.0),
+        most_above_n: 0.0,
     }
 }
 

@@ -171,7 +171,7 @@ impl Reachability {
                 Attainability::Attainable => {}
                 Attainability::BeyondBlockedForce => self.beyond_blocked_force += 1,
                 Attainability::BelowDeadband => self.below_deadband += 1,
-                Attainability::NotRising => self.not_rising += 1,
+                Attainability::NotRising | Attainability::NotANumber => self.not_rising += 1,
             }
         }
     }

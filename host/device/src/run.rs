@@ -183,10 +183,12 @@ fn follow(
     }
     let stream = subscription.insert(Subscription::begin(client, plan.every_ticks)?);
     let silence = stream.silence(SILENCE);
-    client.call::<StartMode>(&Start { mode: plan.quantity.mode(), session: client.session() })?;
+    let started =
+        client.call::<StartMode>(&Start { mode: plan.quantity.mode(), session: client.session() })?;
     let mut steps = Steps::begin(client, plan)?;
     let mut begun = None;
     let mut last_received = Instant::now();
+    let mut waits_since = last_received;
     loop {
         if stop() {
             return Ok(Ending::Stopped);
@@ -199,6 +201,13 @@ fn follow(
                 let early = s.state != State::Running || s.time_us <= status.time_us;
                 if early && begun.is_none() {
                     stream.mark_alive();
+                    // One from after the start: something else has ended the run. So it has where no sample of the run comes, as after
+                    // a restart, whose clock begins again.
+                    let ended = s.state != State::Running && s.time_us > started.time_us;
+                    if ended || waits_since.elapsed() > silence {
+                        still_runs(client)?;
+                        waits_since = Instant::now();
+                    }
                     continue;
                 }
                 let start = *begun.get_or_insert(s.time_us);
@@ -237,6 +246,15 @@ fn follow(
             }
             None => stream.renew(client)?,
         }
+    }
+}
+
+/// Whether the device runs.
+fn still_runs(client: &mut Client) -> Result<()> {
+    match client.call::<GetStatus>(&())?.state {
+        State::Running => Ok(()),
+        State::Fault => Err(fault(client)?),
+        State::Armed | State::Disarmed => Err(ended_by_another()),
     }
 }
 

@@ -3,12 +3,14 @@
 mod common;
 
 use std::net::TcpListener;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::{SIDE, Vice};
 use model_core::link::endpoints::{GetStatus, Restart};
 use pam_data::error::Error;
 use pam_device::error::DeviceCode;
+use pam_device::run::{Plan, run};
+use pam_device::setpoint_profile::{Quantity, SetpointProfile};
 use pam_device::{Address, Client, Patience, Port, Topic, tables};
 
 fn connect(address: &Address) -> Result<Client, Error> {
@@ -126,6 +128,24 @@ fn missing_samples_are_counted_across_the_wrap_and_commands_go_between() {
     assert_eq!(ticks, [65_534, 65_535, 0, 1, 2, 4, 5]);
     let losses = client.losses();
     assert_eq!((losses.samples, losses.gaps, losses.bad_frames), (1, 1, 1));
+}
+
+#[test]
+fn a_run_that_another_program_ends_before_its_first_sample_does_not_wait() {
+    for restarts in [false, true] {
+        let mut client = connect(&common::tcp(Vice::Vented { restarts })).unwrap();
+        let plan = Plan {
+            quantity: Quantity::Pressure,
+            profile: SetpointProfile::Constant(100e3),
+            seconds: Some(1.0),
+            every_ticks: 1,
+        };
+        let begun = Instant::now();
+        let stop = || begun.elapsed() > Duration::from_secs(20);
+        let error = run(&mut client, &plan, |_| Ok(()), stop).unwrap_err();
+        assert_eq!(error.code(), DeviceCode::DeviceRefused, "{error}");
+        assert!(error.to_string().contains("another program has vented"), "{error}");
+    }
 }
 
 #[test]

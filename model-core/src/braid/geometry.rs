@@ -29,11 +29,11 @@ fields!(Geometry<f32> { rest_length, braid_angle, outer_diameter, wall, tip_corr
 /// Which dimension of a muscle cannot be right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum GeometryError {
-    /// The rest length is not a positive number of metres.
+    /// The rest length is not a positive number of metres up to 100.
     RestLength,
     /// The braid angle is not between 0° and 90° from the radial plane.
     BraidAngle,
-    /// The outer diameter is not a positive number of metres.
+    /// The outer diameter is not a positive number of metres up to 100, or gives constants that are no numbers.
     OuterDiameter,
     /// The wall is not positive or not thinner than the radius.
     Wall,
@@ -51,6 +51,9 @@ impl core::fmt::Display for GeometryError {
 }
 
 impl core::error::Error for GeometryError {}
+
+/// Longest muscle and widest bladder, m: more than any, and little enough that no constant of the sleeve leaves the range of single precision.
+const LONGEST_M: f32 = 100.0;
 
 /// Sine and cosine of an angle between 0° and 90°, by their Taylor series about the nearer end: to the precision of `T`, in a
 /// tenth of the code that reduces any angle.
@@ -99,13 +102,14 @@ impl<T: Scalar> Geometry<T> {
         let t0 = self.wall.si();
         let (pi, right) = (T::from_f64(PI), T::from_f64(PI / 2.0));
         let two = T::ONE + T::ONE;
-        if !(l0.is_finite() && l0 > T::ZERO) {
+        let longest = T::from_f32(LONGEST_M);
+        if !(l0 <= longest && l0 > T::ZERO) {
             return Err(GeometryError::RestLength);
         }
         if !(alpha > T::ZERO && alpha < right) {
             return Err(GeometryError::BraidAngle);
         }
-        if !(d0.is_finite() && d0 > T::ZERO) {
+        if !(d0 <= longest && d0 > T::ZERO) {
             return Err(GeometryError::OuterDiameter);
         }
         if !(t0 > T::ZERO && t0 + t0 < d0) {
@@ -119,7 +123,7 @@ impl<T: Scalar> Geometry<T> {
         let pi_n2 = pi * turns * turns;
         let four_pi_n2 = (two + two) * pi_n2;
         let tip = if self.tip_correction { T::from_f64(2.0 * (PI / 2.0 - 1.0)) } else { T::ZERO };
-        Ok(Braid {
+        let braid = Braid {
             rest_length: l0,
             inv_rest_length: T::ONE / l0,
             inv_rest_radius: two / d0,
@@ -135,7 +139,23 @@ impl<T: Scalar> Geometry<T> {
             tip_length: l0 + tip * (d0 / two),
             fibre,
             turns,
-        })
+        };
+        // A diameter that is nothing beside the length, or the length beside it, gives constants that are no numbers.
+        let all = [
+            braid.inv_rest_length,
+            braid.inv_rest_radius,
+            braid.fibre_squared,
+            braid.widening,
+            braid.three_inv_four_pi_turns_squared,
+            braid.fibre_area,
+            braid.inv_two_pi_turns_squared,
+            braid.turns,
+        ];
+        if all.iter().all(|constant| constant.is_finite() && *constant > T::ZERO) {
+            Ok(braid)
+        } else {
+            Err(GeometryError::OuterDiameter)
+        }
     }
 }
 

@@ -42,6 +42,7 @@ fn wild() -> impl Strategy<Value = table::MuscleTable> {
             friction: friction.into_iter().collect(),
             ..table::example()
         })
+        .prop_filter("a usable table", |table| table.check().is_ok())
 }
 
 proptest! {
@@ -64,6 +65,7 @@ proptest! {
             Attainability::BeyondBlockedForce => prop_assert!(miss < 0.0 && found.pressure == search.high, "{found:?}"),
             Attainability::BelowDeadband => prop_assert!(miss > 0.0 && found.pressure == search.low, "{found:?}"),
             Attainability::NotRising => prop_assert!(found.slope <= 0.0 || found.steps == MAX_STEPS, "{found:?}"),
+            Attainability::NotANumber => prop_assert!(false, "{found:?}"),
         }
     }
 }
@@ -93,8 +95,32 @@ fn unreachable_forces_are_reported() {
     let found = m.pressure_for(Force::from_newtons(50.0), &past_neutral, 0.0, Pressure::ZERO, &m.search());
     assert_eq!(found.attainability, Attainability::NotRising);
     let nan = m.pressure_for(Force::from_newtons(f64::NAN), &at_stroke, 0.0, Pressure::ZERO, &m.search());
-    assert_ne!(nan.attainability, Attainability::Attainable);
-    assert!(nan.pressure.is_finite());
+    assert_eq!((nan.attainability, nan.pressure), (Attainability::NotANumber, Pressure::ZERO));
+}
+
+#[test]
+fn a_force_that_is_no_number_gives_the_lowest_pressure() {
+    for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for kpa in [0.0, 100.0, 300.0, 599.0, 600.0] {
+            let m = Muscle::<f32>::build(&table::example()).expect("a valid table");
+            let (force, guess) = (Force::from_newtons(number), Pressure::from_kilopascals(kpa));
+            let search = Search { low: Pressure::from_pascals(10.0), ..m.search() };
+            let found = m.pressure_for(force, &m.at_stroke(Length::ZERO), 0.0, guess, &search);
+            assert_eq!(
+                (found.attainability, found.pressure),
+                (Attainability::NotANumber, search.low),
+                "{number} from {kpa} kPa"
+            );
+            let chain = Chain::none();
+            let point = m.operating_point();
+            let found = m.pressure_by_search(force, &chain, &point, guess, &search);
+            assert_eq!(
+                (found.attainability, found.pressure),
+                (Attainability::NotANumber, search.low),
+                "with effects, {number}"
+            );
+        }
+    }
 }
 
 /// A demand that rises evenly through a pressure of the table is answered without a step and without a kink.

@@ -66,7 +66,7 @@ impl NorFlash for StoreFlash {
             let at = STORE_AT + sector;
             let erased = watchdog::patiently(|| self.0.blocking_erase(at, at + SECTOR as u32));
             power::flush_caches();
-            erased?;
+            erased.ok_or(StoreError(NorFlashErrorKind::Other))??;
         }
         Ok(())
     }

@@ -143,6 +143,11 @@ pub fn supply_is_low() -> bool {
     SAGGED.swap(false, Ordering::Relaxed) || PWR_CSR.read() & 1 << 2 != 0
 }
 
+/// Whether the supply is below now, or has been since the last tick: what a step commands that began before must not close the valve again.
+pub fn sags() -> bool {
+    SAGGED.load(Ordering::Relaxed) || PWR_CSR.read() & 1 << 2 != 0
+}
+
 /// Above every critical section: it opens the valve and leaves the rest to the next tick.
 #[interrupt]
 unsafe fn PVD() {

@@ -115,7 +115,7 @@ impl SlotFlash for Slots {
             (AT[usize::from(slot & 1)] + place, AT[usize::from(slot & 1)] + self.next_sector(slot, place));
         let erased = watchdog::patiently(|| self.0.blocking_erase(from, to));
         power::flush_caches();
-        erased.map_err(|_| Failed)
+        erased.ok_or(Failed)?.map_err(|_| Failed)
     }
 
     fn next_sector(&self, slot: u8, place: u32) -> u32 {

@@ -1,5 +1,6 @@
 //! When the load cell is compared with the table.
 
+use model_core::effects::{EffectName, FittedEffect};
 use model_core::link::messages::HealthSums;
 
 use super::tracking::frictionless;
@@ -66,4 +67,34 @@ fn a_block_is_the_mean_of_one_sample_every_sixteen_ticks() {
     assert_eq!((sums.blocks, SAMPLE_TICKS), (1, 16));
     // The first column is one in every sample.
     assert_eq!((sums.sums[0], sums.weight), (1.0, 1.0));
+}
+
+/// A false reading of a stroke or of a pressure, for some ticks, in a device that is disarmed.
+#[test]
+fn no_effect_remembers_a_reading_that_cannot_be_true() {
+    let mut table = model_core::table::example();
+    let mullins = FittedEffect::new(EffectName::MullinsSoftening, &[0.4, 0.02, 0.1]);
+    table.effects.push(mullins).expect("room");
+    let remembered = |bench: &Bench| {
+        let model = bench.controller.model(Side::Agonist).expect("a table");
+        model.chain.memories().next().expect("an effect").1[0]
+    };
+    let after = |ticks: u32, stroke_m: f32| {
+        let mut bench = Bench::new(|_| ());
+        assert_eq!(bench.controller.use_table(Side::Agonist, &table), Ok(()));
+        bench.pass(200);
+        let before = remembered(&bench);
+        bench.pass_with(ticks, |now, _| now.stroke_m = stroke_m + 1e-7 * now.stroke_m);
+        bench.pass(200);
+        (before, remembered(&bench))
+    };
+    for ticks in [1, 2, 5, 18] {
+        // Beyond what a sensor delivers, and a jump within it.
+        for false_m in [0.3, 0.0528, -0.015, f32::NAN] {
+            let (before, after) = after(ticks, false_m);
+            assert_eq!(before, after, "{false_m} m for {ticks} ticks");
+        }
+    }
+    let (before, after) = after(500, 3e-3);
+    assert!(after > before, "a contraction is remembered: {before}, then {after}");
 }

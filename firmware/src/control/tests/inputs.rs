@@ -191,3 +191,23 @@ fn an_open_enable_input_ends_the_test_of_the_valves_within_three_ticks() {
     assert_eq!(bench.controller.state(), State::Disarmed, "the test does not continue without a request");
     assert!(bench.is_vented());
 }
+
+/// A load comes off and the muscle moves at twice its limit, over a distance of 50 mm.
+#[test]
+fn a_filter_of_the_stroke_hides_no_speed() {
+    let noticed = |filter_s: f32| {
+        let mut bench = Bench::running(|settings| {
+            settings.scales.stroke.filter_s = filter_s;
+            settings.limits.speed_m_per_s = 0.5;
+            settings.stroke.jump = 0.1;
+        });
+        (0..200_u16).find(|tick| {
+            let gone_m = 1e-3 * f32::from((*tick).min(50));
+            bench.pass_with(1, |now, _| now.stroke_m += gone_m);
+            bench.latched() == Some(Fault::OverSpeed)
+        })
+    };
+    let without = noticed(0.0);
+    assert!(without.is_some_and(|ticks| (10..20).contains(&ticks)), "{without:?}");
+    assert_eq!([noticed(0.02), noticed(0.1)], [without; 2]);
+}

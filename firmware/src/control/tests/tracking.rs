@@ -323,3 +323,36 @@ fn nothing_winds_up_while_a_limit_holds_the_command() {
     assert!(falling.force_n > 35.0, "it still falls");
     assert!((falling.trim_pa() - before).abs() < 2e3, "{before} to {}", falling.trim_pa());
 }
+
+/// A muscle that its load holds shorter than it would be: without pressure it is slack.
+#[test]
+fn a_start_of_force_mode_does_not_pressurise_a_slack_muscle() {
+    for goes_slack in [true, false] {
+        for stroke_m in [0.0, 1e-3, 2e-3, 3e-3] {
+            let mut rig = Rig::new(|_| ());
+            let table = MuscleTable { goes_slack, ..frictionless() };
+            assert_eq!(rig.bench.controller.use_table(Side::Agonist, &table), Ok(()));
+            rig.load = Load::Held(stroke_m);
+            let mut rig = rig.start(Mode::Force);
+            rig.pass(500);
+            assert!(rig.pressure_pa < 1e3, "{} Pa at {stroke_m} m", rig.pressure_pa);
+            // What is ordered is done: no force is the pressure at which the muscle begins to pull.
+            rig.set(SetPoint::Force(0.0));
+            rig.pass(500);
+            assert!(rig.pressure_pa > 70e3 && rig.force_n < 1.0, "{} Pa at {stroke_m} m", rig.pressure_pa);
+        }
+    }
+}
+
+#[test]
+fn a_start_of_force_mode_keeps_the_force_of_a_muscle_that_pulls() {
+    let mut rig = Rig::new(|_| ()).start(Mode::Pressure);
+    rig.set(SetPoint::Pressure(300e3));
+    rig.pass(500);
+    let force_n = rig.force_n;
+    let mut rig = rig;
+    assert_eq!(rig.bench.controller.start(Mode::Force, OWNER), Ok(()));
+    rig.load = Load::Held(0.5e-3);
+    rig.pass(500);
+    assert!(force_n > 20.0 && (rig.force_n - force_n).abs() < 0.5, "{force_n} N, then {} N", rig.force_n);
+}

@@ -105,3 +105,46 @@ fn a_device_that_runs_in_the_mode_that_vents_disarms_itself_like_an_armed_one() 
     assert_eq!(bench.controller.state(), State::Disarmed);
     assert_eq!(bench.latched(), None);
 }
+
+/// A converter that misses a tick now and then: what was not read decides nothing.
+#[test]
+fn ticks_without_readings_pass_no_valve_test() {
+    for (regulator_works, valve_works) in [(false, false), (false, true), (true, false)] {
+        for missing in [[true, false], [false, true], [true, true]] {
+            let mut bench = Bench::new(|settings| {
+                settings.watch.valve_test_pa = TEST_PA;
+                settings.watch.debounce_ticks = 20;
+            });
+            (bench.regulator_works, bench.valve_works) = (regulator_works, valve_works);
+            let second = [Some(Readings { pressure_pa: 0.0, ..Readings::default() }.into()); 2];
+            bench.controller.step(&Inputs { sides: second, ..Inputs::default() });
+            bench.pass(10);
+            assert_eq!(bench.controller.arm(OWNER), Ok(()));
+            for _ in 0..2_100 {
+                // In every other tick nothing arrives from one muscle, or from both.
+                let now = Readings { pressure_pa: bench.pressure_pa, ..Readings::default() };
+                let read = |side: usize| (!missing[side]).then(|| now.into());
+                bench.controller.step(&Inputs { sides: [read(0), read(1)], ..Inputs::default() });
+                bench.pass(1);
+                assert_eq!(bench.controller.keep_alive(OWNER), Ok(()));
+            }
+            let found = (bench.controller.state(), bench.latched());
+            assert_eq!(found, (State::Fault, Some(Fault::ValveTest)), "{regulator_works} {valve_works}");
+        }
+    }
+}
+
+#[test]
+fn a_sound_muscle_passes_the_valve_test_although_ticks_are_missing() {
+    let mut bench = Bench::new(|settings| {
+        settings.watch.valve_test_pa = TEST_PA;
+        settings.watch.debounce_ticks = 20;
+    });
+    bench.pass(10);
+    assert_eq!(bench.controller.arm(OWNER), Ok(()));
+    for _ in 0..300 {
+        bench.controller.step(&Inputs::default());
+        bench.pass(1);
+    }
+    assert_eq!((bench.controller.state(), bench.latched()), (State::Armed, None));
+}

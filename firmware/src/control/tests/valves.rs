@@ -190,3 +190,47 @@ fn while_the_valves_cannot_follow_no_integrator_continues() {
     it.pass(5_000);
     assert_eq!(it.controller.sides[0].saturation, 0.0);
 }
+
+/// A blocked line or a frozen converter: without a fault, the loop would fill the muscle up to the pressure of the supply.
+#[test]
+fn a_pressure_reading_that_does_not_answer_the_valves_vents_before_the_muscle_is_far_beyond() {
+    type Reading = fn(u32) -> f32;
+    let readings: [(&str, Reading); 3] = [
+        ("frozen", |_| 0.0),
+        ("blocked line", |tick| 400.0 * (tick as f32 * 12.9898).sin()),
+        ("slow drift", |tick| -0.5 * tick as f32),
+    ];
+    for (name, reading) in readings {
+        for (low_pa, hold_on) in [(2.5e3, 0), (4e3, 0), (4e3, u32::MAX), (20e3, 0), (60e3, 0)] {
+            let mut it = Loop::running(|s| s.hold_on = hold_on);
+            it.to(200e3);
+            it.pass(500);
+            let frozen = 200e3 - low_pa;
+            let (mut most, mut at) = (0.0_f64, None);
+            for tick in 0..20_000 {
+                it.pass_with(|now| now.pressure_pa = frozen + reading(tick));
+                most = most.max(it.muscle.pressure_pa());
+                if at.is_none() && it.latched().is_some() {
+                    at = Some(tick);
+                }
+            }
+            assert_eq!(it.latched(), Some(Fault::PressureNotRising), "{name}, {low_pa} Pa low");
+            assert!(most < 350e3, "{name}, {low_pa} Pa low: {most} Pa, fault after {at:?} ms");
+            assert!(it.muscle.pressure_pa() < 1e3, "{}", it.muscle.pressure_pa());
+        }
+    }
+}
+
+#[test]
+fn a_pressure_sensor_that_reads_nothing_ends_the_valve_test_before_the_muscle_is_full() {
+    let mut it = Loop::new(|s| s.watch.valve_test_pa = 40e3);
+    it.pass(10);
+    assert_eq!(it.controller.arm(OWNER), Ok(()));
+    let mut most = 0.0_f64;
+    for _ in 0..2_000 {
+        it.pass_with(|now| now.pressure_pa = 0.0);
+        most = most.max(it.muscle.pressure_pa());
+    }
+    assert_eq!(it.latched(), Some(Fault::ValveTest));
+    assert!(most < 200e3, "{most} Pa");
+}

@@ -165,3 +165,113 @@ fn a_restart_reaches_what_takes_another_firmware() {
     server.restarted(&shared).expect("a store").boot();
     assert_eq!(count.load(std::sync::atomic::Ordering::Relaxed), 2);
 }
+
+const SET: (EffectName, &[f64]) = (EffectName::PermanentSet, &[1e-4, 0.0, 10.0, 1e4]);
+
+/// Tables A and B, and back to A; B's effect remembers something, and that lies on the flash.
+#[test]
+fn a_table_sent_after_a_rollback_has_no_memory_of_the_one_gone_back_from() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &image(40.0)).is_ok());
+    let second = send(&mut server, &shared, &with_effects(&[MULLINS])).expect("it is taken");
+    pass(&shared, 10, &mut 0.0);
+    let worked = [3.5; model_core::effects::MEMORY];
+    shared.with(|c| c.model_mut(Side::Agonist).expect("a table").chain.restore(0, &worked));
+    server.keep(&shared);
+    let back = RollBack { side: Side::Agonist, generation: second.generation };
+    let mut first = TableInfo::default();
+    assert_eq!(Answers { server: &mut server, shared: &shared }.table_rollback(&back, &mut first), Ok(()));
+    let third = send(&mut server, &shared, &with_effects(&[SET])).expect("it is taken");
+    assert!(third.generation > second.generation, "{third:?} after {second:?}");
+    let memory = || {
+        let first =
+            |c: &Controller| c.model(Side::Agonist)?.chain.memories().next().map(|(_, memory)| *memory);
+        shared.with(|c| first(c).expect("an effect"))
+    };
+    assert_ne!(memory(), worked);
+    let server = server.restarted(&shared).expect("a store");
+    assert_ne!(memory(), worked, "after a restart");
+    drop(server);
+}
+
+/// The settings of a user who has a lower limit and a valve test.
+fn own_settings() -> Settings {
+    let mut settings = Settings::default();
+    settings.limits.pressure_pa = 300e3;
+    settings.watch.valve_test_pa = 40e3;
+    settings
+}
+
+/// A flash with a table and settings of a user.
+fn in_use() -> MockFlash {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    assert!(send(&mut server, &shared, &image(40.0)).is_ok());
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.set_settings(&own_settings(), &mut Settings::default()), Ok(()));
+    server.store.close()
+}
+
+/// What is in force after a start: the settings, the latched fault, and whether there is a table.
+fn in_force(shared: &Shared) -> (Settings, Option<Fault>, bool) {
+    shared.with(|controller| {
+        let latched = controller.faults().latched.map(|report| report.fault);
+        (*controller.settings(), latched, controller.model(Side::Agonist).is_some())
+    })
+}
+
+#[test]
+fn writes_that_fail_at_a_start_erase_neither_settings_nor_tables() {
+    for fails in [1, 2, 3, 5, 10, 1_000] {
+        let mut flash = in_use().failing_first(fails);
+        for start in 1..=4 {
+            let shared = Shared::new(Settings::default());
+            let server = started(flash, &shared);
+            assert_eq!(in_force(&shared), (own_settings(), None, true), "start {start}, {fails} failures");
+            flash = server.store.close();
+        }
+    }
+}
+
+#[test]
+fn a_store_that_had_to_be_erased_is_trusted_at_no_start_until_settings_are_sent() {
+    let mut flash = in_use();
+    // Every page says that it is full, and none can be read.
+    flash.bytes.fill(0);
+    for start in 1..=3 {
+        let shared = Shared::new(Settings::default());
+        let server = started(flash, &shared);
+        let (_, latched, has_table) = in_force(&shared);
+        assert_eq!((latched, has_table), (Some(Fault::SettingsInvalid), false), "start {start}");
+        assert_eq!(shared.with(Controller::clear), Err(Refusal::StillFaulty(Fault::SettingsInvalid)));
+        assert!(shared.with(|controller| controller.arm(OWNER)).is_err());
+        flash = server.store.close();
+    }
+    let shared = Shared::new(Settings::default());
+    let mut server = started(flash, &shared);
+    let mut answers = Answers { server: &mut server, shared: &shared };
+    assert_eq!(answers.set_settings(&own_settings(), &mut Settings::default()), Ok(()));
+    let shared = Shared::new(Settings::default());
+    let server = started(server.store.close(), &shared);
+    assert_eq!(in_force(&shared), (own_settings(), None, false), "confirmed");
+    drop(server);
+}
+
+/// A new table cannot be kept, and the one before cannot be read any more: no table is in use, and not the one that was refused.
+#[test]
+fn a_refused_table_does_not_stay_in_use_where_the_one_before_is_damaged() {
+    let shared = Shared::new(Settings::default());
+    let mut server = started(MockFlash::erased(), &shared);
+    let before = image(40.0);
+    assert!(send(&mut server, &shared, &before).is_ok());
+    let empty = Store::open(MockFlash::erased()).expect("a store");
+    let mut flash = core::mem::replace(&mut server.store, empty).close();
+    let place = flash.bytes.windows(64).position(|bytes| bytes == &before[..64]).expect("it is on the flash");
+    flash.bytes[place + 10] ^= 0x10;
+    server.store = Store::open(flash.failing_after(0)).expect("a store");
+    assert!(matches!(send(&mut server, &shared, &image(60.0)), Err(Refusal::Store(_))));
+    let (_, latched, has_table) = in_force(&shared);
+    assert_eq!((latched, has_table), (Some(Fault::TableInvalid), false));
+    assert_eq!(deadband_in_use(&shared), None);
+}

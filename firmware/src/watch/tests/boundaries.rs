@@ -21,6 +21,7 @@ fn still(pressure_pa: f32, stroke_m: f32, force_n: f32) -> Seen {
         expected_pa: pressure_pa,
         model_n: None,
         second_pa: None,
+        most_above_n: 0.0,
     }
 }
 

@@ -23,6 +23,7 @@ fn tick(random: &mut Random, last: &Seen) -> Seen {
     now.pressure_pa += 400.0 * (random.part() - 0.5);
     now.stroke_m += 1e-4 * (random.part() - 0.5);
     now.force_n += 0.5 * (random.part() - 0.5);
+    seen.most_above_n = if random.one_in(2) { 15.0 } else { 0.0 };
     seen.speed_m_per_s = 0.02 * random.part();
     seen.command.pressure_pa += 60e3 * (random.part() - 0.5);
     if let Some(before) = last.readings {
@@ -48,6 +49,7 @@ fn tick(random: &mut Random, last: &Seen) -> Seen {
         7 => seen.command.vent = true,
         8 => now.pressure_pa += 60e3,
         9 => now.force_n += 30.0,
+        10 => now.force_n -= 30.0,
         _ => (),
     }
     seen.readings = (!random.one_in(200)).then_some(now);

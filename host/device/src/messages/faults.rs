@@ -56,7 +56,7 @@ pub fn fault(fault: Fault) -> FaultMessage {
         Fault::PressureNotRising => (
             "pressure-not-rising",
             "the pressure stays below the command",
-            "check for a burst bladder, a leak, or a closed air supply",
+            "check for a burst bladder, a leak, or a closed air supply; with a pair of valves also for a blocked pressure sensor",
             "Pa",
         ),
         Fault::PressureNotFalling => (

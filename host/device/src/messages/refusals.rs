@@ -1,6 +1,6 @@
 //! Refused requests as errors: what was refused, why, and the remedy.
 
-use model_core::link::endpoints::{ClearFault, Endpoint};
+use model_core::link::endpoints::{ClearFault, Endpoint, StartMode};
 use model_core::link::messages::{Field, Refusal, State, StoreFault, TableFault, UpdateFault};
 use pam_data::error::Error;
 use pam_data::pluralise::pluralise;
@@ -48,6 +48,10 @@ pub(crate) fn refused(request: &str, refusal: Refusal) -> Error {
         Refusal::WrongMode(running) => (
             format!("it is in {} mode", mode(running)),
             "setpoints and references must match the running mode".to_owned(),
+        ),
+        Refusal::Value(Field::SensorWatch) if request == StartMode::NAME => (
+            "this mode needs a stroke sensor, and the settings have none".to_owned(),
+            "connect one and set it: host device settings --set stroke.fitted=true".to_owned(),
         ),
         Refusal::Value(field) => (
             format!("{} is out of range or not a number", field_name(field)),
@@ -213,6 +217,8 @@ mod tests {
         let error = refused("set_settings", Refusal::Value(Field::Valves));
         assert!(error.to_string().contains("the setting `valves`"), "{error}");
         assert!(error.advice().is_some_and(|advice| advice.contains("a board with outputs for it")));
+        let error = refused("start", Refusal::Value(Field::SensorWatch));
+        assert!(error.to_string().contains("needs a stroke sensor"), "{error}");
         let error = refused("set_settings", Refusal::Value(Field::Can));
         assert!(error.advice().is_some_and(|advice| advice.contains("125, 250, 500 or 1000")));
         let error = refused("set_point", Refusal::Angle { low_rad: -0.1, high_rad: 0.1 });

@@ -10,13 +10,14 @@ use std::thread;
 
 use model_core::check;
 use model_core::link::endpoints::{
-    BeginTable, CommitTable, Endpoint, GetInfo, GetStatus, ReadTable, SendTablePiece, TELEMETRY,
+    Arm, BeginTable, CommitTable, Disarm, Endpoint, GetInfo, GetStatus, KeepAlive, ReadTable, SendTablePiece,
+    SetTelemetry, SetTo, StartMode, Stop, TELEMETRY,
 };
 use model_core::link::frame::{Accumulator, Header, Kind, MAX_WIRE, encode, encode_bytes};
 use model_core::link::hello::{self, Hello};
 use model_core::link::messages::{
     DeviceInfo, Mode, Refusal, Side, SideSample, StartedBy, State, Status, TableBegin, TableFault, TableInfo,
-    TablePiece, TableRead, Telemetry,
+    TablePiece, TableRead, Telemetry, TelemetryRate,
 };
 use model_core::link::{LINK_VERSION, SCHEMA_HASH};
 use pam_device::Address;
@@ -41,6 +42,11 @@ pub enum Vice {
     RefusesTables,
     /// Sends telemetry with the number 3 missing, and noise between frames.
     SkipsSamples,
+    /// Another program vents it between the start of a mode and the first sample; its clock stands after the start, or begins again.
+    Vented {
+        /// Whether the clock begins again, as after a restart.
+        restarts: bool,
+    },
 }
 
 /// The state of a peer.
@@ -50,11 +56,12 @@ pub struct Peer {
     pieces: Vec<u8>,
     kept: Option<Vec<u8>>,
     lost: usize,
+    samples: u16,
 }
 
 impl Peer {
     pub fn new(vice: Vice) -> Self {
-        Self { vice, begun: None, pieces: Vec::new(), kept: None, lost: usize::MAX }
+        Self { vice, begun: None, pieces: Vec::new(), kept: None, lost: usize::MAX, samples: 0 }
     }
 
     /// Serves until the line closes.
@@ -110,6 +117,27 @@ impl Peer {
                     out.extend_from_slice(&wire[..length]);
                 }
                 let length = encode(ok, &status(), &mut wire).unwrap();
+                out.extend_from_slice(&wire[..length]);
+                return Some(out);
+            }
+            Arm::ID | StartMode::ID | SetTo::ID | Stop::ID | Disarm::ID | GetStatus::ID
+                if matches!(self.vice, Vice::Vented { .. }) =>
+            {
+                let state = match header.id {
+                    StartMode::ID | SetTo::ID => State::Running,
+                    _ => State::Armed,
+                };
+                encode(ok, &Status { state, time_us: 5_000_000, ..status() }, &mut wire)
+            }
+            SetTelemetry::ID => encode(ok, &TelemetryRate { every_ticks: 1 }, &mut wire),
+            KeepAlive::ID => {
+                let restarts = self.vice == Vice::Vented { restarts: true };
+                self.samples += 1;
+                let tick = u64::from(self.samples) + if restarts { 0 } else { 5_000 };
+                let header = Header { kind: Kind::Topic, id: TELEMETRY, sequence: self.samples };
+                let length = encode(header, &sample(tick), &mut wire).unwrap();
+                let mut out = wire[..length].to_vec();
+                let length = encode(ok, &(), &mut wire).unwrap();
                 out.extend_from_slice(&wire[..length]);
                 return Some(out);
             }
