@@ -16,6 +16,7 @@ use super::decimal;
 use super::import::{FoundZero, Import, NewRun, Value, Zero};
 use super::plausibility::check;
 use super::quantity::Quantity;
+use super::read::FilterValues;
 use super::stroke_zero::{at_largest, first_level, smallest};
 use super::text_column::TextColumn;
 use super::time_of_day;
@@ -45,6 +46,8 @@ pub(super) struct Job<'a> {
     pub muscle_name: Option<&'a str>,
     pub import: &'a Import,
     pub filters: &'a [(String, Value)],
+    /// Takes what the columns of the filters hold.
+    pub filter_values: Option<&'a FilterValues>,
     pub plan: &'a ColumnPlan,
     pub names: &'a [String],
     pub lookup: Option<&'a LookupTable>,
@@ -218,6 +221,9 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
     let mut rest_length = false;
     for ((name, value), words) in job.filters.iter().zip(&table.filters) {
         rest_length |= value.is_of_length();
+        if let Some(values) = job.filter_values {
+            values.note(name, &words.words);
+        }
         let fits = |word: &String| passes(job, name, value, word);
         let verdicts: Vec<bool> = words.words.iter().map(fits).collect::<Result<_>>()?;
         for (kept, code) in keep.iter_mut().zip(&words.codes) {
