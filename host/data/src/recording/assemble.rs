@@ -33,6 +33,8 @@ pub(super) struct LookupTable {
 /// Columns of a whole file, by what they are for.
 struct Table {
     quantities: HashMap<Quantity, Vec<f64>>,
+    /// Whether the times are times of day without a date.
+    of_day: bool,
     splits: Vec<TextColumn>,
     filters: Vec<TextColumn>,
 }
@@ -115,20 +117,22 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
     let plan = job.plan;
     let mut table = Table {
         quantities: HashMap::new(),
+        of_day: false,
         splits: vec![TextColumn::default(); job.import.split_by.len()],
         filters: vec![TextColumn::default(); job.filters.len()],
     };
     let mut keys: HashMap<usize, TextColumn> = HashMap::new();
+    let (mut stamp, mut parts) = (None, Vec::new());
     for (i, role) in plan.roles.iter().enumerate() {
         let words = std::mem::take(&mut rows.texts[i]);
         match role {
             Role::Quantity(q) => {
-                let mut values = std::mem::take(&mut rows.numbers[i]);
+                table.quantities.insert(*q, std::mem::take(&mut rows.numbers[i]));
                 if let Want::Stamp { scale, offset, .. } = plan.wanted[i].want {
-                    time_of_day::past_midnight(&mut values, scale, offset);
+                    stamp = Some((scale, offset));
                 }
-                table.quantities.insert(*q, values);
             }
+            Role::TimePart => parts.push(i),
             Role::Coded(q, values) => {
                 let name = &job.names[plan.wanted[i].index];
                 let code = |row: usize| {
@@ -152,6 +156,15 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
             Role::Key(n) => {
                 keys.insert(*n, words);
             }
+        }
+    }
+    if let Some(times) = table.quantities.get_mut(&Quantity::Time) {
+        for part in parts {
+            times.iter_mut().zip(&rows.numbers[part]).for_each(|(time, part)| *time += part);
+        }
+        if let Some((scale, offset)) = stamp {
+            table.of_day = time_of_day::are(times, scale, offset);
+            time_of_day::past_midnight(times, scale, offset);
         }
     }
     if !plan.looked_up.is_empty()
@@ -387,6 +400,7 @@ fn take(
     labels: &[String],
 ) -> Result<Recording> {
     let stretch = rows.as_deref().and_then(contiguous);
+    let time_of_day = table.of_day;
     let mut column = |quantity: Quantity| match (&rows, &stretch) {
         // The whole file: its columns move over without a copy.
         (None, _) => table.quantities.remove(&quantity),
@@ -443,6 +457,7 @@ fn take(
         labels,
         rest_length,
         time: column(Quantity::Time).unwrap_or_default(),
+        time_of_day,
         pressure: column(Quantity::Pressure).unwrap_or_default(),
         stroke,
         force: column(Quantity::Force),

@@ -19,6 +19,7 @@
 
 mod absolute;
 mod forms;
+mod joined_time;
 mod layout;
 mod lookup;
 mod named_length;
@@ -77,6 +78,10 @@ pub struct GuessedColumn {
     pub from_longest: bool,
     /// Words with their direction.
     pub values: Vec<(String, i8)>,
+    /// Of a time of day, the column of the dates.
+    pub date: Option<Source>,
+    /// Of a time, the column of the parts of a second that it lacks, and their unit.
+    pub fraction: Option<(Source, &'static str)>,
     /// The least and the greatest cell.
     pub range: Option<(f64, f64)>,
 }

@@ -19,6 +19,7 @@ use super::lookup::read_lookup;
 use super::mcap::Needed;
 use super::quantity::{Named, Quantity, named};
 use super::source;
+use super::time_of_day;
 use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
@@ -146,7 +147,10 @@ impl<'a> Reader<'a> {
         if !self.absent_values {
             values.check()?;
         }
-        Ok(Campaign::new(recordings))
+        let remark = time_of_day::on_following_days(&mut recordings);
+        let mut campaign = Campaign::new(recordings);
+        campaign.warnings.extend(remark);
+        Ok(campaign)
     }
 
     /// Reads one file: one recording, or several when the import description splits it.

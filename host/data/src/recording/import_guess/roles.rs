@@ -59,6 +59,7 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
         }
     }
     time::find(sample, &mut used, &mut guess);
+    time::describe_parts(sample, &mut used, &mut guess);
     problems::texts(sample, &mut guess);
     named_pressure::find(sample, others, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
@@ -100,7 +101,8 @@ fn best(
 ) -> Option<usize> {
     let fits = |(n, c): (usize, &SampleColumn)| -> Option<(Score, usize)> {
         let (q, score) = c.name.quantity()?;
-        (q == quantity && c.is_numeric() && !used[n]).then_some((score, n))
+        let part = sample.joined.is_some_and(|j| j.fraction.is_some_and(|(part, _)| part == n));
+        (q == quantity && c.is_numeric() && !used[n] && !part).then_some((score, n))
     };
     let mut found: Vec<(Score, usize)> = sample.columns.iter().enumerate().filter_map(fits).collect();
     // A load cell that reads one value throughout is not connected.
@@ -109,6 +111,9 @@ fn best(
     let steady = |n: usize| quantity == Quantity::Pressure && is_steady(&sample.columns[n], others);
     found.sort_by_cached_key(|(score, n)| (dead(*n), -score, steady(*n), *n));
     let (score, first) = *found.first()?;
+    if quantity == Quantity::Time && time::is_unclear(sample, &found, guess) {
+        return None;
+    }
     let competitors: Vec<&str> = found[1..]
         .iter()
         .filter(|(s, _)| *s == score)
@@ -205,6 +210,8 @@ fn described(
         extension: quantity == Quantity::Displacement && column.name.lengthens(),
         from_longest: false,
         values: Vec::new(),
+        date: None,
+        fraction: None,
         range: Some((low, high)),
     })
 }
@@ -283,6 +290,8 @@ fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess)
                 extension: false,
                 from_longest: false,
                 values,
+                date: None,
+                fraction: None,
                 range: None,
             });
         }
@@ -340,6 +349,8 @@ fn from_list(quantity: Quantity, header: &str, name: &Name) -> GuessedColumn {
         extension: quantity == Quantity::Displacement && name.lengthens(),
         from_longest: false,
         values: Vec::new(),
+        date: None,
+        fraction: None,
         range: None,
     }
 }

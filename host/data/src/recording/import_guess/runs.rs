@@ -27,7 +27,8 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
     let mut candidates: Vec<(bool, usize)> = columns
         .iter()
         .enumerate()
-        .filter(|(n, _)| *n != clock)
+        // A time of day is no label of a run, although a coarse one changes only where the parts of its second begin again.
+        .filter(|(n, c)| *n != clock && !c.is_stamped())
         .filter_map(|(n, c)| Some((labels(c)?, n)))
         .collect();
     // Columns that are called run or condition before those of lengths and other settings.

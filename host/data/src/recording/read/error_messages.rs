@@ -74,6 +74,8 @@ pub(super) fn rows_error(error: RowsError, header: &Header, import: &Import) -> 
         Fault::NotAStamp => Error::new(DataCode::RecordingNotANumber, "not a time stamp").help(
             "time stamps are like 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25; a month before the day is ambiguous",
         ),
+        Fault::NotADate => Error::new(DataCode::RecordingNotANumber, "not a date")
+            .help("dates are like 2026-11-21 or 21.11.2026; a month before the day needs unit = \"timestamp-month-first\""),
         Fault::Width { found, expected } => {
             let cells = pluralise(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {
