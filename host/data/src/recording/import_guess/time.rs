@@ -66,7 +66,7 @@ pub(super) fn find(sample: &Sample, used: &mut [bool], guess: &mut Guess) {
             format!(
                 "column {} is taken as the time in {}, since it increases from row to row",
                 column.header,
-                if suggested.scale == 1.0 { suggested.unit } else { "µs" }
+                suggested.spelled()
             )
             .into(),
         );

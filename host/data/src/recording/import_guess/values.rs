@@ -24,6 +24,17 @@ pub(super) struct Suggested {
     pub others: Vec<&'static str>,
 }
 
+impl Suggested {
+    /// The unit with its scale, as it is spelled.
+    pub(super) fn spelled(&self) -> &'static str {
+        match self.scale {
+            1e-3 if self.unit == "ms" => "µs",
+            1e-6 if self.unit == "ms" => "ns",
+            _ => self.unit,
+        }
+    }
+}
+
 /// The units for which a value lies within bounds in SI: (name of the unit, further scale, factor to SI).
 fn allowed(value: f64, bounds: (f64, f64), units: &[(&'static str, f64, f64)]) -> Option<Suggested> {
     let mut fits = units.iter().filter(|(_, _, si)| (bounds.0..=bounds.1).contains(&(value * si)));
@@ -53,7 +64,8 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn, others: &[Ran
             allowed(size, STROKES, &[("mm", 1.0, 1e-3), ("m", 1.0, 1.0), ("in", 1.0, 0.0254)])
         }
         Quantity::Time => {
-            allowed(interval(column)?, INTERVALS, &[("s", 1.0, 1.0), ("ms", 1.0, 1e-3), ("ms", 1e-3, 1e-6)])
+            let units = [("s", 1.0, 1.0), ("ms", 1.0, 1e-3), ("ms", 1e-3, 1e-6), ("ms", 1e-6, 1e-9)];
+            allowed(interval(column)?, INTERVALS, &units)
         }
         Quantity::Force => Some(Suggested { unit: "N", scale: 1.0, others: vec!["kg", "lbf"] }),
         Quantity::Temperature => Some(Suggested { unit: "C", scale: 1.0, others: vec![] }),
@@ -169,6 +181,9 @@ mod tests {
         };
         assert_eq!((at(0.01).unit, at(10.0).unit), ("s", "ms"));
         assert_eq!((at(1000.0).unit, at(1000.0).scale), ("ms", 1e-3));
+        // Nanoseconds since 1970.
+        let epoch = suggested(Quantity::Time, &column((0..20).map(|i| 1.7e18 + 3.3e7 * f64::from(i))), &[]);
+        assert_eq!(epoch.map(|s| (s.spelled(), s.scale)), Some(("ns", 1e-6)));
         // 120 may be kPa or psi, and is reported so.
         assert_eq!(
             suggested(Quantity::Pressure, &column([0.0, 120.0]), &[]).map(|s| s.others),
