@@ -33,6 +33,7 @@ mod grid;
 mod side_by_side;
 
 use constants::Constants;
+pub(super) use error_messages::unpacked;
 use error_messages::{block_error, rows_error};
 pub use filter_values::FilterValues;
 
@@ -88,6 +89,15 @@ impl Hashes {
 const LOOKED_BELOW: usize = 100;
 #[cfg(feature = "excel")]
 use super::workbook::is_one as workbook_magic;
+
+/// Whether a text has numbers such as `"0,25"` in quotation marks.
+#[cfg(feature = "excel")]
+fn has_commas_in_quotes(text: &[u8]) -> bool {
+    text.split(|b| *b == b'"').skip(1).step_by(2).any(|cell| {
+        let bare = cell.strip_prefix(b"-").unwrap_or(cell);
+        bare.contains(&b',') && bare.iter().all(|b| b.is_ascii_digit() || *b == b',')
+    })
+}
 
 /// Distinguishes workbooks from text in builds that do not read workbooks.
 #[cfg(not(feature = "excel"))]
@@ -206,8 +216,14 @@ impl<'a> Reader<'a> {
         let mut description = self.description();
         let sheet = super::workbook::sheet(path, &mut source, description.sheet.as_deref())?;
         if description.delimiter.is_some() || description.decimal != Decimal::Point {
+            // The numbers of a sheet have points, whatever the files of the same bench have, but not those that it holds as text.
+            let as_text = description.decimal == Decimal::Comma && has_commas_in_quotes(&sheet.text);
             let own = description.into_owned();
-            description = Cow::Owned(Import { delimiter: None, decimal: Decimal::Point, ..own });
+            description = Cow::Owned(if as_text {
+                Import { delimiter: Some("comma".into()), ..own }
+            } else {
+                Import { delimiter: None, decimal: Decimal::Point, ..own }
+            });
         }
         source.size = Some(sheet.text.len() as u64);
         source.reader = Box::new(std::io::Cursor::new(sheet.text));

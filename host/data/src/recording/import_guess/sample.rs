@@ -15,8 +15,9 @@ use crate::recording::Quantity;
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
 use crate::recording::header::mac_lines;
-use crate::recording::line::decode;
+use crate::recording::line::{decode, is_remark};
 use crate::recording::mcap::Needed;
+use crate::recording::read::unpacked;
 use crate::recording::source;
 use crate::recording::time_of_day;
 #[cfg(feature = "excel")]
@@ -206,7 +207,7 @@ impl Sample {
             None => {
                 let mut text = Vec::new();
                 let read = source.reader.take(LOOKED_AT).read_to_end(&mut text);
-                read.map_err(|e| Error::unreadable(path, &e))?;
+                read.map_err(unpacked)?;
                 Self::of_text(&text)
             }
         }
@@ -231,7 +232,8 @@ impl Sample {
             ));
         };
         layout.comment = forms::sign_of_remarks(&lines, &layout);
-        layout.remarks |= layout.comment != b'#';
+        let remark = |line: &&[u8]| is_remark(line, Some(layout.comment));
+        layout.remarks |= lines[layout.data_at..].iter().any(remark);
         let lossy = |l: &&[u8]| decode(l).trim_end().to_owned();
         let names_at = layout.names_at.unwrap_or(layout.data_at);
         let mut sample = Self {

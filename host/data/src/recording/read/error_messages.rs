@@ -14,13 +14,20 @@ pub(super) fn block_error(error: BlockError) -> Error {
             Error::new(DataCode::RecordingNotText, "the file has a line of more than 4 MiB")
                 .help("this is not a table of text: give a CSV or tab-separated file with one header line")
         }
-        BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
-        BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
-            Error::new(DataCode::FileUnreadable, format!("cannot be read: {e}"))
+        BlockError::Io(e) => unpacked(e),
+    }
+}
+
+/// The error of a file that is open and cannot be read, or unpacked, to its end.
+pub(in crate::recording) fn unpacked(error: std::io::Error) -> Error {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => Error::unreadable("", &error),
+        std::io::ErrorKind::PermissionDenied => {
+            Error::new(DataCode::FileUnreadable, format!("cannot be read: {error}"))
         }
-        BlockError::Io(e) => {
+        _ => {
             // What follows a colon is the unpacker's own, written for its authors.
-            let reason = e.to_string();
+            let reason = error.to_string();
             let reason = reason.split(':').next().unwrap_or_default();
             Error::new(DataCode::RecordingContainer, format!("cannot be read to its end: {reason}"))
                 .help("the file may be damaged or incomplete: copy it again")
