@@ -194,10 +194,11 @@ pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
 /// and their names may say which one.
 ///
 /// # Errors
-/// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
+/// A file that cannot be read, or that holds no table; others whose columns have other places or units, where nothing else would notice
+/// it. Others that cannot be read are left out.
 pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let mut guess = roles::assign(path, &sample, &Others::of(others, sheet));
+    let mut guess = roles::assign(path, &sample, &Others::of(others, sheet)).map_err(|e| e.file(path))?;
     guess.description = text::description(&guess);
     Ok(guess)
 }

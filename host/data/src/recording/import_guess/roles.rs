@@ -10,12 +10,16 @@ use super::{
     Guess, GuessedColumn, Note, Source, absolute, named_length, named_pressure, problems, runs, side_by_side,
     stroke, time, values,
 };
+use crate::error::Result;
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 use crate::short_number::short;
 
 /// Decides on every column.
-pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess {
+///
+/// # Errors
+/// Other files whose columns are not those of the first.
+pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Result<Guess> {
     let mut guess = Guess {
         file: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         rows: sample.rows,
@@ -29,7 +33,8 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     if let Some(layout) = &sample.layout {
         guess.delimiter = sample.sheet.is_none().then(|| layout.delimiter_name().to_owned());
         guess.decimal_comma = layout.decimal_comma;
-        guess.remarks = layout.remarks.then(|| char::from(layout.comment));
+        let remarks = layout.remarks || layout.comment == b'#' && others.have_remarks();
+        guess.remarks = remarks.then(|| char::from(layout.comment));
         guess.thousands = sample.thousands.map(char::from);
         guess.skip_lines =
             if sample.has_header { layout.names_at.unwrap_or(layout.data_at) } else { layout.data_at };
@@ -70,14 +75,24 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     if !several {
         problems::incomplete_rows(sample, &mut guess);
     }
-    problems::other_columns(sample, others, &mut guess);
-    let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
-    guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
+    problems::other_columns(sample, others, &guess)?;
+    guess.unused = (0..used.len()).filter(|n| !used[*n]).filter_map(|n| called(sample, n)).collect();
     // Of recordings side by side that are not described nothing is.
     if !several || guess.side_by_side.is_some() {
         what_is_missing(sample, &mut guess);
     }
-    guess
+    Ok(guess)
+}
+
+/// What a column is called in messages; `None` for an empty one without a name.
+fn called(sample: &Sample, n: usize) -> Option<String> {
+    let column = &sample.columns[n];
+    let empty = column.missing == column.numbers.len();
+    match column.header.as_str() {
+        "" if empty => None,
+        "" => Some(format!("column {}", n + 1)),
+        header => Some(header.to_owned()),
+    }
 }
 
 /// Where a column is, for the description: by name where the reader finds that name once.
@@ -114,13 +129,17 @@ fn best(
     if quantity == Quantity::Time && time::is_unclear(sample, &found, guess) {
         return None;
     }
-    let competitors: Vec<&str> = found[1..]
-        .iter()
-        .filter(|(s, _)| *s == score)
-        .map(|(_, n)| sample.columns[*n].header.as_str())
-        .collect();
+    let competitors: Vec<usize> = found[1..].iter().filter(|(s, _)| *s == score).map(|(_, n)| *n).collect();
     if !competitors.is_empty() {
         let header = &sample.columns[first].header;
+        // Columns of one name are told apart by their numbers.
+        let twice = competitors.iter().any(|n| sample.columns[*n].header == *header);
+        let name = |n: usize| {
+            let header = &sample.columns[n].header;
+            if twice { format!("column {} ({header})", n + 1) } else { header.clone() }
+        };
+        let header = name(first);
+        let competitors: Vec<String> = competitors.into_iter().map(name).collect();
         if quantity == Quantity::PressureCommand {
             let text = format!(
                 "commanded pressures are in {header}, {}: describe that of this muscle as columns.pressure_command",
@@ -264,7 +283,7 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
     } else {
         format!(" (or {})", suggested.others.join(", "))
     };
-    let check = format!("{header} has no unit; its values look like {unit}{others}");
+    let check = format!("{header} has no unit; its values look like {}{others}", suggested.spelled());
     Ok(GuessedUnit { unit, scale, check: Some(check), ..plain })
 }
 
