@@ -141,3 +141,29 @@ fn columns_of_time_that_disagree_are_not_chosen_from() {
         assert_eq!(read(&[("a.csv", text(shift))]).1.recordings[0].time[1], 0.25);
     }
 }
+
+#[test]
+fn days_of_spreadsheets_and_of_matlab_count_from_1970() {
+    // 2024-03-12 10:00, by `date -u -d 2024-03-12T10:00 +%s`.
+    let start = 1_710_237_600.0;
+    for days in [25_569.0, 719_529.0] {
+        let text = format!("Date,{QUANTITIES}") + &rows(0.0, |t| format!("{:.10}", days + (start + t) / DAY));
+        let (guess, campaign) = read(&[("a.csv", text)]);
+        let time = &campaign.recordings[0].time;
+        assert!(
+            (time[0] - start).abs() < 1e-4 && (time[3] - time[0] - 0.75).abs() < 1e-4,
+            "{}",
+            guess.description
+        );
+    }
+}
+
+#[test]
+fn a_sampling_rate_above_a_table_without_times_is_taken() {
+    for (line, interval) in [("Sampling rate [Hz]: 40", 0.025), ("Abtastrate;2,5;kHz", 0.0004)] {
+        let text = format!("{line}\n{QUANTITIES}") + &rows(0.0, |_| "x".into()).replace("x,", "");
+        let (guess, campaign) = read(&[("a.csv", text)]);
+        assert!((campaign.recordings[0].time[1] - interval).abs() < 1e-12, "{}", guess.description);
+        assert!(guess.unknown.is_empty() && !guess.checks.is_empty(), "{:?}", guess.unknown);
+    }
+}

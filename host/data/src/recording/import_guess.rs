@@ -122,6 +122,8 @@ pub struct Guess {
     pub thousands: Option<char>,
     /// Whether rows without a number in a column that is used are left out.
     pub skip_missing: bool,
+    /// Seconds between rows, where the lines above the table say it and no column is the time.
+    pub sample_interval_s: Option<f64>,
     /// Constants that are taken from the file's name or from the lines above the table.
     pub patterns: Vec<GuessedPattern>,
     /// Columns that set runs apart.
@@ -159,7 +161,7 @@ impl Guess {
             let scaled = c.scale != 1.0 || c.offset != 0.0;
             !(scaled || c.extension || c.from_longest || !c.values.is_empty())
         };
-        let one = !self.new_run_by_clock && self.side_by_side.is_none();
+        let one = !self.new_run_by_clock && self.side_by_side.is_none() && self.sample_interval_s.is_none();
         let whole = one && self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
         whole && self.lookup.is_none() && self.columns.iter().all(plain)
     }

@@ -216,7 +216,7 @@ impl<'a> Reader<'a> {
         let mut description = self.description();
         let sheet = super::workbook::sheet(path, &mut source, description.sheet.as_deref())?;
         if description.delimiter.is_some() || description.decimal != Decimal::Point {
-            // The numbers of a sheet have points, whatever the files of the same bench have, but not those that it holds as text.
+            // The numbers of a sheet have points, also where the text files of a bench have commas. Numbers that it holds as text keep theirs.
             let as_text = description.decimal == Decimal::Comma && has_commas_in_quotes(&sheet.text);
             let own = description.into_owned();
             description = Cow::Owned(if as_text {

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::lookup;
-use super::names::{Family, Name, Score};
+use super::names::{Family, Name, Score, is_of_matrix};
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
+use super::text::quoted;
 use super::{
     Guess, GuessedColumn, Note, Source, absolute, named_length, named_pressure, problems, runs, side_by_side,
     stroke, time, values,
@@ -13,6 +14,7 @@ use super::{
 use crate::error::Result;
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
+use crate::recording::time_of_day::DAY;
 use crate::short_number::short;
 
 /// Decides on every column.
@@ -65,6 +67,7 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Resul
     }
     time::find(sample, &mut used, &mut guess);
     time::describe_parts(sample, &mut used, &mut guess);
+    time::interval(sample, &mut guess);
     problems::texts(sample, &mut guess);
     named_pressure::find(sample, others, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
@@ -132,7 +135,7 @@ fn best(
     let competitors: Vec<usize> = found[1..].iter().filter(|(s, _)| *s == score).map(|(_, n)| *n).collect();
     if !competitors.is_empty() {
         let header = &sample.columns[first].header;
-        // Columns of one name are told apart by their numbers.
+        // Columns of one name differ in their numbers only.
         let twice = competitors.iter().any(|n| sample.columns[*n].header == *header);
         let name = |n: usize| {
             let header = &sample.columns[n].header;
@@ -278,13 +281,14 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
         ));
     };
     let (unit, scale) = (suggested.unit, suggested.scale);
+    let offset = if scale == DAY { values::epoch_of_days(column) } else { 0.0 };
     let others = if suggested.others.is_empty() {
         String::new()
     } else {
         format!(" (or {})", suggested.others.join(", "))
     };
     let check = format!("{header} has no unit; its values look like {}{others}", suggested.spelled());
-    Ok(GuessedUnit { unit, scale, check: Some(check), ..plain })
+    Ok(GuessedUnit { unit, scale, offset, check: Some(check) })
 }
 
 /// The largest number of a column in all files, of either sign.
@@ -413,9 +417,19 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
+    if !guess.has(Quantity::Force)
+        && let Some(column) = sample.columns.iter().find(|c| is_of_matrix(&c.header))
+    {
+        let text = format!(
+            "the columns of a matrix have no names: write which is what, such as column = {} and unit = \"s\" under [columns.time]",
+            quoted(&column.header)
+        );
+        guess.unknown.push(text.into());
+        return;
+    }
     let is_noted =
         |guess: &Guess, quantity: Quantity| guess.unknown.iter().any(|note| note.is_on_quantity(quantity));
-    if !guess.has(Quantity::Time) && !is_noted(guess, Quantity::Time) {
+    if !guess.has(Quantity::Time) && guess.sample_interval_s.is_none() && !is_noted(guess, Quantity::Time) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
         guess.unknown.insert(0, text.into());
     }

@@ -86,6 +86,9 @@ fn file_form(guess: &Guess) -> String {
     if guess.skip_missing {
         out += "missing = \"skip\"\n";
     }
+    if let Some(interval) = guess.sample_interval_s {
+        let _ = writeln!(out, "sample_interval_s = {}", number(interval));
+    }
     for GuessedPattern { text, expression, .. } in &guess.patterns {
         let _ = writeln!(out, "{text} = {}", literal(expression));
     }

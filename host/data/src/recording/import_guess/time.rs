@@ -135,6 +135,34 @@ pub(super) fn describe_parts(sample: &Sample, used: &mut [bool], guess: &mut Gue
     guess.checks.push(format!("the time is {} with {}", column.header, parts.join(" and ")).into());
 }
 
+/// The interval of the rows, by the one line above the table that says how many there are in a second.
+pub(super) fn interval(sample: &Sample, guess: &mut Guess) {
+    if guess.has(Quantity::Time) || guess.unknown.iter().any(|note| note.is_on_quantity(Quantity::Time)) {
+        return;
+    }
+    let mut rates = sample.preamble.iter().filter_map(|line| Some((line, rate(line)?)));
+    let (Some((line, rate)), None) = (rates.next(), rates.next()) else { return };
+    guess.sample_interval_s = Some(1.0 / rate);
+    let text = format!(
+        "no column is the time: the rows are taken to be equally spaced, by the line above the table `{}`",
+        line.trim()
+    );
+    guess.checks.push(text.into());
+}
+
+/// The rate in Hz that a line such as `Sampling rate [Hz]: 30` says.
+fn rate(line: &str) -> Option<f64> {
+    let lower = line.to_lowercase();
+    let named =
+        ["sampl", "abtast", "scan rate", "data rate", "acquisition rate"].iter().any(|w| lower.contains(w));
+    let scale = if lower.contains("khz") { 1e3 } else { 1.0 };
+    let mut numbers = lower
+        .split(|c: char| !(c.is_ascii_digit() || c == '.' || c == ','))
+        .filter_map(|n| n.trim_matches([',', '.']).replace(',', ".").parse::<f64>().ok());
+    let (Some(number), None) = (numbers.next(), numbers.next()) else { return None };
+    (named && lower.contains("hz") && number > 0.0).then_some(scale * number)
+}
+
 /// A column as the time.
 fn time_column(
     sample: &Sample,

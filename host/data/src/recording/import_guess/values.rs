@@ -3,6 +3,7 @@
 use super::others::Range;
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
+use crate::recording::time_of_day::DAY;
 use crate::short_number::short;
 use crate::statistics::extremes;
 use crate::statistics::median;
@@ -30,6 +31,7 @@ impl Suggested {
         match self.scale {
             1e-3 if self.unit == "ms" => "µs",
             1e-6 if self.unit == "ms" => "ns",
+            DAY => "days",
             _ => self.unit,
         }
     }
@@ -64,13 +66,23 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn, others: &[Ran
             allowed(size, STROKES, &[("mm", 1.0, 1e-3), ("m", 1.0, 1.0), ("in", 1.0, 0.0254)])
         }
         Quantity::Time => {
-            let units = [("s", 1.0, 1.0), ("ms", 1.0, 1e-3), ("ms", 1e-3, 1e-6), ("ms", 1e-6, 1e-9)];
+            let units =
+                [("s", 1.0, 1.0), ("ms", 1.0, 1e-3), ("ms", 1e-3, 1e-6), ("ms", 1e-6, 1e-9), ("s", DAY, DAY)];
             allowed(interval(column)?, INTERVALS, &units)
         }
         Quantity::Force => Some(Suggested { unit: "N", scale: 1.0, others: vec!["kg", "lbf"] }),
         Quantity::Temperature => Some(Suggested { unit: "C", scale: 1.0, others: vec![] }),
         _ => Some(Suggested { unit: "", scale: 1.0, others: vec![] }),
     }
+}
+
+/// What is added to times in days, s, so that they count from 1970: a spreadsheet counts them from the end of 1899, MATLAB from year 0.
+pub(super) fn epoch_of_days(column: &SampleColumn) -> f64 {
+    /// Days of the years from 1982 to 2063, and what they are for 1970-01-01.
+    const COUNTS: [((f64, f64), f64); 2] = [((30e3, 60e3), 25_569.0), ((724e3, 754e3), 719_529.0)];
+    let (low, high) = column.range();
+    let counted = COUNTS.iter().find(|((from, to), _)| low >= *from && high <= *to);
+    counted.map_or(0.0, |(_, days)| -days * DAY)
 }
 
 /// Whether all numbers are the same.

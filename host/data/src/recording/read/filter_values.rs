@@ -1,4 +1,4 @@
-//! Whether the files have the values that the filters of a call name: a misspelled value would exclude nothing, or be one of a list in vain.
+//! Whether the files have the values that the filters of a call name: a misspelled value would exclude or add nothing.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -41,7 +41,7 @@ impl FilterValues {
         let mut filters = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         for filter in filters.iter_mut().filter(|f| f.column == column) {
             for (text, found) in std::iter::once(&mut filter.whole).chain(&mut filter.parts) {
-                // What stands in braces is the muscle's.
+                // Names in braces are properties of the muscle.
                 *found = *found || text.starts_with('{') || words.iter().any(|word| same(text, word));
             }
             for word in words {
