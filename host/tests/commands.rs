@@ -289,3 +289,54 @@ fn the_second_name_is_the_same_program() {
     let html = std::fs::read_to_string(at("r.html")).unwrap();
     assert!(html.contains("<code>pam predict") && !html.contains("<code>host"), "{html}");
 }
+
+/// A slow stroke of 40 rows in a folder, with a description of its muscle.
+fn with_a_recording(name: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..40)
+        .map(|i| f64::from(i) / 20.0 - 1.0)
+        .enumerate()
+        .map(|(i, x)| {
+            format!("{},300,{},{}\n", 0.05 * i as f64, 4.0 * (1.0 - x.abs()), 90.0 - 20.0 * (1.0 - x.abs()))
+        })
+        .collect();
+    std::fs::write(folder.path().join(name), format!("time_s,pressure_kPa,displacement_mm,force_N\n{rows}"))
+        .unwrap();
+    let muscle = "name = \"m\"\nkind = \"contractile\"\nrest_length_mm = 39.16\nbraid_angle_deg = 77.4\n\
+                  bladder_outer_diameter_mm = 3.0\nbladder_wall_mm = 0.5\n";
+    std::fs::write(folder.path().join("m.toml"), muscle).unwrap();
+    folder
+}
+
+#[test]
+fn two_outputs_in_one_file_are_refused_before_anything_is_written() {
+    let folder = with_a_recording("a.csv");
+    for outputs in [["-o", "x.pam", "--json", "./x.pam"], ["--json", "x.html", "--report", "x.html"]] {
+        let call = [&["fit", "--muscle", "m.toml", "a.csv"][..], &outputs].concat();
+        let (status, said) = host(folder.path(), &call, None);
+        assert!(status == 2 && said.contains("name the same file"), "{said}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn the_command_behind_a_guess_can_be_copied() {
+    let folder = with_a_recording("my run.csv");
+    let (status, said) =
+        host(folder.path(), &["import", "--guess", "my run.csv", "-o", "my bench.toml"], None);
+    assert!(status == 0 && said.contains("--import 'my bench.toml' 'my run.csv'"), "{said}");
+}
+
+#[test]
+fn a_filter_names_what_it_cannot_do() {
+    let folder = with_a_recording("a.csv");
+    let fit =
+        |filter: &str| host(folder.path(), &["fit", "--muscle", "m.toml", "a.csv", "--where", filter], None);
+    let (status, said) = fit("force_N>=1");
+    assert!(status == 2 && said.contains("does not compare by `>=`"), "{said}");
+    let (status, said) = fit("pressure_kPa!=99");
+    assert!(
+        status == 2 && said.contains("no row has this value") && said.contains("is one of 300"),
+        "{said}"
+    );
+}

@@ -69,8 +69,8 @@ pub fn in_text(text: &str) -> Option<f64> {
 }
 
 /// A time stamp, s: of a date with a time of day since 1970, of a time of day alone since midnight. Dates are those of ISO 8601
-/// (`2026-11-21T13:30:00.25Z`, also with a blank, and with an offset such as `+01:00`) or `21.11.2026`; a month before the day is
-/// ambiguous. `None` for any other text.
+/// (`2026-11-21T13:30:00.25Z`, also with a blank, and with an offset such as `+01:00`), `21.11.2026`, or `21-Nov-2026`; a month before the
+/// day is ambiguous. Milliseconds may follow a colon. `None` for any other text.
 ///
 /// ```
 /// use pam_data::date::time_stamp;
@@ -103,23 +103,71 @@ pub(crate) enum DateOrder {
 #[must_use]
 pub(crate) fn time_stamp_in(text: &str, order: DateOrder) -> Option<f64> {
     let text = text.trim().as_bytes();
+    let Some((date, rest)) = calendar_date(text, order) else {
+        // `05:30` alone may be minutes and seconds.
+        let whole = text.iter().filter(|b| **b == b':').count() >= 2;
+        return time_with_parts(text)
+            .filter(|(_, rest)| whole && rest.is_empty())
+            .map(|(seconds, _)| seconds);
+    };
+    let (b' ' | b'T' | b't', rest) = rest.split_first()? else { return None };
+    let (seconds, rest) = time_with_parts(rest.trim_ascii_start())?;
+    let offset = offset_of_zone(rest.trim_ascii())?;
+    Some(date? + seconds - offset)
+}
+
+/// A date alone, s since 1970 at its midnight, in the forms that [`time_stamp_in`] reads before a time of day. A spreadsheet writes the
+/// midnight behind it.
+///
+/// ```
+/// use pam_data::date::{DateOrder, date_in};
+/// let day = Some(1_795_219_200.0);
+/// assert_eq!(date_in("2026-11-21", DateOrder::YearFirst), day);
+/// assert_eq!(date_in("21.11.2026 00:00:00", DateOrder::YearFirst), day);
+/// assert_eq!(date_in("11/21/2026", DateOrder::MonthFirst), day);
+/// assert_eq!(date_in("2026-11-21 13:30:00", DateOrder::YearFirst), None);
+/// ```
+#[must_use]
+pub(crate) fn date_in(text: &str, order: DateOrder) -> Option<f64> {
+    let (date, rest) = calendar_date(text.trim().as_bytes(), order)?;
+    let midnight = match rest.split_first() {
+        None => true,
+        Some((b' ' | b'T', rest)) => {
+            time_with_parts(rest).is_some_and(|(s, rest)| s == 0.0 && rest.is_empty())
+        }
+        Some(_) => false,
+    };
+    date.filter(|_| midnight)
+}
+
+/// A date at the beginning of a text, s since 1970 at its midnight, and what follows; no number where the calendar has no such day.
+fn calendar_date(text: &[u8], order: DateOrder) -> Option<(Option<f64>, &[u8])> {
+    let century = |(year, rest)| (2000 + year, rest);
     let iso = |text| {
         let (year, rest) = number(text, 4)?;
         let (month, rest) = short(rest.strip_prefix(b"-").or_else(|| rest.strip_prefix(b"/"))?)?;
         let (day, rest) = short(rest.strip_prefix(b"-").or_else(|| rest.strip_prefix(b"/"))?)?;
         Some((year, month, day, rest))
     };
+    // With points the day is first.
     let german = |text| {
         let (day, rest) = short(text)?;
         let (month, rest) = short(rest.strip_prefix(b".")?)?;
-        let (year, rest) = number(rest.strip_prefix(b".")?, 4)?;
+        let rest = rest.strip_prefix(b".")?;
+        let (year, rest) = number(rest, 4).or_else(|| number(rest, 2).map(century))?;
+        Some((year, month, day, rest))
+    };
+    let named = |text| {
+        let (day, rest) = short(text)?;
+        let (month, rest) = named_month(after(rest, b"- "))?;
+        let rest = after(rest, b"- ");
+        let (year, rest) = number(rest, 4).or_else(|| number(rest, 2).map(century))?;
         Some((year, month, day, rest))
     };
     let slashes = |text| {
         let (first, rest) = short(text)?;
         let (second, rest) = short(rest.strip_prefix(b"/")?)?;
         let rest = rest.strip_prefix(b"/")?;
-        let century = |(year, rest)| (2000 + year, rest);
         let (year, rest) = number(rest, 4).or_else(|| number(rest, 2).map(century))?;
         match order {
             DateOrder::YearFirst => None,
@@ -127,21 +175,21 @@ pub(crate) fn time_stamp_in(text: &str, order: DateOrder) -> Option<f64> {
             DateOrder::DayFirst => Some((year, second, first, rest)),
         }
     };
-    let dated = iso(text).or_else(|| german(text)).or_else(|| slashes(text));
-    let Some((year, month, day, rest)) = dated else {
-        // `05:30` alone may be minutes and seconds.
-        let whole = text.iter().filter(|b| **b == b':').count() == 2;
-        return time_with_parts(text)
-            .filter(|(_, rest)| whole && rest.is_empty())
-            .map(|(seconds, _)| seconds);
-    };
+    let dated = iso(text).or_else(|| german(text)).or_else(|| named(text)).or_else(|| slashes(text));
+    let (year, month, day, rest) = dated?;
     let real = (1970..2100).contains(&year)
         && (1..=12).contains(&month)
         && (1..=days_of(year, month)).contains(&day);
-    let (b' ' | b'T' | b't', rest) = rest.split_first()? else { return None };
-    let (seconds, rest) = time_with_parts(rest.trim_ascii_start())?;
-    let offset = offset_of_zone(rest.trim_ascii())?;
-    real.then(|| seconds_since_1970(year, month, day) as f64 + seconds - offset)
+    Some((real.then(|| seconds_since_1970(year, month, day) as f64), rest))
+}
+
+/// The number of a month that is written as its first three letters in English, and what follows.
+fn named_month(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    const MONTHS: [&[u8]; 12] =
+        [b"jan", b"feb", b"mar", b"apr", b"may", b"jun", b"jul", b"aug", b"sep", b"oct", b"nov", b"dec"];
+    let (name, rest) = bytes.split_at_checked(3)?;
+    let number = MONTHS.iter().position(|m| name.eq_ignore_ascii_case(m))?;
+    Some((number as u64 + 1, rest))
 }
 
 /// A time of day, s, and what follows it, also with `AM` or `PM`.
@@ -173,10 +221,12 @@ fn time_of_24_hours(bytes: &[u8]) -> Option<(f64, &[u8])> {
         return None;
     }
     let whole = (3600 * hour + 60 * minute + second) as f64;
-    let (b'.' | b',', parts) = rest.split_first().unwrap_or((&b' ', rest)) else {
-        return Some((whole, rest));
-    };
+    let (sign, parts) = rest.split_first().unwrap_or((&b' ', rest));
     let digits = parts.iter().take_while(|b| b.is_ascii_digit()).count();
+    // Behind a third colon stand milliseconds, with all three digits.
+    if !(matches!(sign, b'.' | b',') || *sign == b':' && digits == 3) {
+        return Some((whole, rest));
+    }
     let parts_of_second = std::str::from_utf8(&parts[..digits]).ok()?;
     let share: f64 = format!("0.{parts_of_second}0").parse().ok()?;
     Some((whole + share, &parts[digits..]))
@@ -320,12 +370,29 @@ mod tests {
         for text in same {
             assert_eq!(time_stamp(text), Some(noon + 1.5), "{text}");
         }
+        for text in [
+            "21.11.26 12:00:01:500",
+            "21-Nov-2026 12:00:01.5",
+            "21-NOV-26 12:00:01,5",
+            "21 nov 2026 12:00:01.5",
+        ] {
+            assert_eq!(time_stamp(text), Some(noon + 1.5), "{text}");
+        }
+        assert_eq!(time_stamp("12:00:01:500"), Some(43_201.5));
         assert_eq!(time_stamp("1.2.2026 9:05:07"), time_stamp("01.02.2026 09:05:07"));
         assert_eq!((time_stamp("9:05:07"), time_stamp("12:00:01 am")), (Some(32_707.0), Some(1.0)));
         // Minutes and seconds, a month before the day, the thirteenth hour of twelve.
-        for text in
-            ["05:30", "5:30.25", "11/21/2026 13:30:00", "13:30:00 PM", "0:30:00 AM", "9:5:7", "9:05:07 XM"]
-        {
+        for text in [
+            "05:30",
+            "5:30.25",
+            "11/21/2026 13:30:00",
+            "13:30:00 PM",
+            "0:30:00 AM",
+            "9:5:7",
+            "9:05:07 XM",
+            "9:05:07:5",
+            "31-Feb-2026 9:05:07",
+        ] {
             assert_eq!(time_stamp(text), None, "{text}");
         }
     }

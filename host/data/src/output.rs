@@ -5,7 +5,7 @@ mod folder_lock;
 use std::ffi::OsString;
 use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
@@ -122,7 +122,7 @@ mod unnamed {
 }
 
 /// Whether one of a call's results, each with the option that names its destination, goes to standard output: text for people must not
-/// then.
+/// then. Two results must not have one destination; this is checked before anything is written.
 ///
 /// ```
 /// use pam_data::output::to_standard_output;
@@ -132,11 +132,13 @@ mod unnamed {
 /// assert!(!to_standard_output(&[("-o", to("a.pam")), ("--json", None)])?);
 /// let refused = to_standard_output(&[("-o", to("-")), ("--json", to("-"))]).unwrap_err();
 /// assert_eq!(refused.exit_status(), 2);
+/// let refused = to_standard_output(&[("-o", to("a.pam")), ("--json", to("./a.pam"))]).unwrap_err();
+/// assert_eq!(refused.cause(), "-o and --json name the same file");
 /// # Ok::<(), pam_data::error::Error>(())
 /// ```
 ///
 /// # Errors
-/// [`DataCode::CallInvalid`] for more than one: they could not be separated.
+/// [`DataCode::CallInvalid`] for more than one there, which could not be separated, or in one file, which the last would replace.
 pub fn to_standard_output(results: &[(&str, Option<&Path>)]) -> Result<bool> {
     let there: Vec<&str> =
         results.iter().filter(|(_, path)| *path == Some(Path::new("-"))).map(|(option, _)| *option).collect();
@@ -147,7 +149,33 @@ pub fn to_standard_output(results: &[(&str, Option<&Path>)]) -> Result<bool> {
         )
         .help("use `-` for one of them, and files for the others"));
     }
+    let mut files: Vec<(&str, PathBuf)> = Vec::new();
+    for (option, path) in results.iter().filter_map(|(o, p)| Some((*o, p.and_then(place)?))) {
+        if let Some((first, _)) = files.iter().find(|(_, other)| *other == path) {
+            return Err(Error::new(
+                DataCode::CallInvalid,
+                format!("{first} and {option} name the same file"),
+            )
+            .file(path)
+            .help("name another file for one of them"));
+        }
+        files.push((option, path));
+    }
     Ok(!there.is_empty())
+}
+
+/// Where a file is, or will be, however its path is written; `None` of what takes several results, such as standard output or a device.
+fn place(path: &Path) -> Option<PathBuf> {
+    match fs::metadata(path) {
+        _ if path == Path::new("-") => None,
+        Ok(there) if !there.is_file() => None,
+        Ok(_) => Some(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
+        Err(_) => {
+            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+            Some(path.file_name().map_or_else(|| path.to_owned(), |name| folder.join(name)))
+        }
+    }
 }
 
 /// Where `--json` without a file puts its result, for [`to_standard_output`].

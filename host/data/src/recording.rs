@@ -56,5 +56,5 @@ pub use import::{Import, Missing};
 pub use mountings::{Preceding, Rest, SAME_LENGTH, VENTING};
 pub use noise::{resolution, white_noise};
 pub use quantity::{HeaderName, Quantity, Unit, parse_header};
-pub use read::{Hashes, Reader};
+pub use read::{FilterValues, Hashes, Reader};
 pub use spikes::usual_change;

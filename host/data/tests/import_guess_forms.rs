@@ -1,7 +1,8 @@
 //! Import descriptions by guess: the same readings in forms of loggers and test machines, and pressures in names.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 
 use pam_data::error::Error;
 use pam_data::recording::import_guess::{Guess, guess_among};
@@ -281,18 +282,102 @@ fn units_without_a_name_are_taken_from_all_files() {
 }
 
 #[test]
-fn files_with_another_order_of_columns_are_reported_where_columns_are_counted() {
+fn files_with_other_places_or_units_are_refused_where_columns_are_counted() {
     let machine = |names: &str, row: fn([f64; 4]) -> String| format!("{names}\n{}", stroke(row)).into_bytes();
-    let first = machine("Time\tPressure\tStroke\tForce\ns\tkPa\tmm\tN", |[t, p, x, f]| {
-        format!("{t:.2}\t{p}\t{x:.3}\t{f:.3}")
-    });
-    let other = machine("Time\tForce\tStroke\tPressure\ns\tN\tmm\tkPa", |[t, p, x, f]| {
+    let usual = |[t, p, x, f]: [f64; 4]| format!("{t:.2}\t{p}\t{x:.3}\t{f:.3}");
+    let first = machine("Time\tPressure\tStroke\tForce\ns\tkPa\tmm\tN", usual);
+    let order = machine("Time\tForce\tStroke\tPressure\ns\tN\tmm\tkPa", |[t, p, x, f]| {
         format!("{t:.2}\t{f:.3}\t{x:.3}\t{p}")
     });
-    let remarks =
-        |second: &Vec<u8>| read(&[("a.txt", first.clone()), ("b.txt", second.clone())]).0.all_unknown();
-    assert!(remarks(&other).contains("b.txt have other names or another order"), "{}", remarks(&other));
-    assert_eq!(remarks(&first), "");
+    let unit = machine("Time\tPressure\tStroke\tForce\ns\tbar\tmm\tN", |[t, p, x, f]| {
+        format!("{t:.2}\t{}\t{x:.3}\t{f:.3}", p / 100.0)
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let guessed = |others: &[&Vec<u8>]| {
+        let paths: Vec<_> = (0..=others.len()).map(|n| folder.path().join(format!("{n}.txt"))).collect();
+        for (path, bytes) in paths.iter().zip(std::iter::once(&&first).chain(others)) {
+            std::fs::write(path, bytes).unwrap();
+        }
+        guess_among(&paths[0], &paths[1..], None)
+    };
+    let refused = |others: &[&Vec<u8>]| guessed(others).unwrap_err().cause().to_owned();
+    let cause = "the columns have other names, units, or places than in 0.txt: ";
+    assert_eq!(refused(&[&order]), format!("{cause}1.txt"));
+    assert_eq!(refused(&[&unit, &first, &order]), format!("{cause}1.txt, 3.txt"));
+    assert!(guessed(&[&first]).unwrap().unknown.is_empty());
+}
+
+#[test]
+fn a_remark_below_the_table_is_left_out_as_without_a_description() {
+    let rows = |many: usize| {
+        (0..many).fold(String::new(), |mut text, i| {
+            writeln!(text, "{},300,{},{}", 0.1 * i as f64, 0.01 * i as f64, 90 - i % 7).unwrap();
+            text
+        })
+    };
+    let head = "time_s,pressure_kPa,displacement_mm,force_N\n";
+    let file = |end: &str| format!("{head}{}{end}", rows(500)).into_bytes();
+    for files in [["# end\n", ""], ["", "# end\n"]] {
+        let (guess, recordings) = read(&[("a.csv", file(files[0])), ("b.csv", file(files[1]))]);
+        assert_eq!(recordings.unwrap_or_else(|e| panic!("{e} {}", guess.description))[0].len(), 500);
+    }
+}
+
+#[test]
+fn one_cell_with_both_signs_proves_the_separator_of_thousands() {
+    let grouped = |value: f64, decimals: usize| {
+        let plain = format!("{value:.decimals$}");
+        let (whole, rest) = plain.split_at(plain.find('.').unwrap_or(plain.len()));
+        if whole.len() < 4 {
+            plain
+        } else {
+            format!("{},{}{rest}", &whole[..whole.len() - 3], &whole[whole.len() - 3..])
+        }
+    };
+    // Milliseconds, pascals and millinewtons; only the last column proves the form.
+    let row = |[t, p, x, f]: [f64; 4]| {
+        [grouped(1e3 * t, 0), grouped(1e3 * p, 0), format!("{x:.4}"), grouped(1e3 * f, 1)]
+    };
+    let us = stroke(|r| row(r).map(|cell| format!("\"{cell}\"")).join(","));
+    let de = stroke(|r| row(r).map(|c| c.replace('.', "_").replace(',', ".").replace('_', ",")).join(";"));
+    for (name, text) in [
+        ("us.csv", format!("Time (ms),Pressure (Pa),Stroke (mm),Force (mN)\n{us}")),
+        ("de.csv", format!("Zeit [ms];Druck [Pa];Weg [mm];Kraft [mN]\n{de}")),
+    ] {
+        let (guess, recordings) = read(&[(name, text.into())]);
+        let read = &recordings.unwrap_or_else(|e| panic!("{name}: {e} {}", guess.description))[0];
+        let (force, stroke) = (read.require_force().unwrap()[20], read.stroke[20]);
+        assert!((force - 10.0).abs() < 1e-6 && (stroke - 4e-3).abs() < 1e-9, "{name}: {force} {stroke}");
+        assert!((read.pressure[0] - 300e3).abs() < 1e-6 && (read.time[39] - 1.95).abs() < 1e-9, "{name}");
+    }
+}
+
+#[test]
+fn files_that_are_incomplete_or_no_tables_are_reported_with_what_helps() {
+    let refused = |name: &str, bytes: &[u8]| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let guessed = guess_among(&path, &[], None).unwrap_err();
+        let read = Reader::new().file(&path).unwrap_err();
+        assert_eq!((guessed.code(), guessed.cause()), (read.code(), read.cause()), "{name}");
+        format!("{} | {}", guessed.cause(), guessed.advice().unwrap())
+    };
+    let table = String::from_utf8(without_pressure()).unwrap().replace("force_N\n", "force_N\n\n");
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    gzip.write_all(table.repeat(50).as_bytes()).unwrap();
+    let gzip = gzip.finish().unwrap();
+    assert!(refused("a.csv.gz", &gzip[..gzip.len() / 2]).contains("copy it again"));
+    let objects = "{\"time_s\": 0.5, \"force_N\": 3}\n".repeat(20);
+    let list = format!(" [\n{}]", objects.trim_end().replace('\n', ",\n"));
+    for text in [&objects, &list] {
+        assert!(
+            refused("a.json", text.as_bytes())
+                .starts_with("the file is JSON, which is not read | write it as CSV")
+        );
+    }
+    let zeros = [table.as_bytes(), &[0; 900]].concat();
+    assert!(refused("a.csv", &zeros).starts_with("the file ends in zero bytes"));
 }
 
 #[test]

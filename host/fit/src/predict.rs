@@ -339,11 +339,37 @@ pub fn beyond(table: &MuscleTable, places: &[(f64, f64)]) -> Vec<String> {
 /// `file`. Where the prediction has bands, a last column `force_model_band_N` is half the width of the force's 95 % interval.
 ///
 /// Where all files are plain text with one header their cells are kept as they are, other columns included. Recordings
-/// that came in by an import description, with decimal commas, or from other containers, are written in the usual columns instead.
+/// that came in by an import description, with decimal commas, or from other containers, are written in the usual columns instead; `false`
+/// then. Columns of an earlier prediction are replaced, and a column `file` of the recordings is called `file_in_recording` where there
+/// is one before it.
 #[must_use]
-pub fn to_csv(campaign: &Campaign, prediction: &Prediction, imported: bool) -> Vec<u8> {
+pub fn to_csv(campaign: &Campaign, prediction: &Prediction, imported: bool) -> (Vec<u8>, bool) {
     let verbatim = if imported { None } else { verbatim(campaign, prediction) };
-    verbatim.unwrap_or_else(|| standard(campaign, prediction)).into_bytes()
+    let whole = verbatim.is_some();
+    (verbatim.unwrap_or_else(|| standard(campaign, prediction)).into_bytes(), whole)
+}
+
+/// The columns that a prediction adds behind those of the recordings.
+const PREDICTED: [&str; 2] = ["force_model_N", "force_model_band_N"];
+
+/// The cells of a line as they are written, with their quotation marks.
+fn cells(line: &str, delimiter: char) -> Vec<&str> {
+    let mut quoted = false;
+    let ends = |c: char| {
+        quoted ^= c == '"';
+        c == delimiter && !quoted
+    };
+    line.split(ends).collect()
+}
+
+/// A header without the columns of an earlier prediction, and the places of the columns that remain; `None` where all do.
+fn own_columns(header: &str, delimiter: char, several: bool) -> (String, Option<Vec<usize>>) {
+    let all = cells(header, delimiter);
+    let bare = |n: usize| all[n].trim().trim_matches('"');
+    let kept: Vec<usize> = (0..all.len()).filter(|n| !PREDICTED.contains(&bare(*n))).collect();
+    let name = |n: &usize| if several && bare(*n) == "file" { "file_in_recording" } else { all[*n] };
+    let names: Vec<&str> = kept.iter().map(name).collect();
+    (names.join(&delimiter.to_string()), (kept.len() < all.len()).then_some(kept))
 }
 
 fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
@@ -351,6 +377,7 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
     let banded = prediction.recordings.iter().all(|p| p.bands.is_some());
     let mut out = String::new();
     let mut header: Option<(String, char)> = None;
+    let mut kept = None;
     for (recording, predicted) in campaign.recordings.iter().zip(&prediction.recordings) {
         if recording.rows.is_some() {
             return None;
@@ -365,7 +392,9 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
             None => {
                 let file = if several { format!("file{delimiter}") } else { String::new() };
                 let band = if banded { format!("{delimiter}force_model_band_N") } else { String::new() };
-                let _ = writeln!(out, "{file}{first}{delimiter}force_model_N{band}");
+                let own;
+                (own, kept) = own_columns(first, delimiter, several);
+                let _ = writeln!(out, "{file}{own}{delimiter}force_model_N{band}");
                 header = Some((first.to_owned(), delimiter));
             }
             Some((known, _)) if known != first => return None,
@@ -383,7 +412,15 @@ fn verbatim(campaign: &Campaign, prediction: &Prediction) -> Option<String> {
             if several {
                 let _ = write!(out, "{}{delimiter}", cell(&recording.name, delimiter));
             }
-            let _ = write!(out, "{row}{delimiter}{force:.6}");
+            match &kept {
+                None => out += row,
+                Some(kept) => {
+                    let cells = cells(row, delimiter);
+                    let own = kept.iter().map(|n| cells.get(*n).copied()).collect::<Option<Vec<&str>>>()?;
+                    out += &own.join(&delimiter.to_string());
+                }
+            }
+            let _ = write!(out, "{delimiter}{force:.6}");
             end_line(&mut out, predicted, i, delimiter);
         }
     }
@@ -479,5 +516,15 @@ mod tests {
             limits.errors(&recording, &[0.0, 3.0, 46.0, 130.0, 0.0], &[true, true, true, true, false]);
         assert_eq!((errors.scored, errors.at_limit, errors.square), (2, 2, 25.0));
         assert_eq!(errors.counts, [false, true, true, false, false]);
+    }
+
+    #[test]
+    fn an_earlier_prediction_is_replaced_and_no_name_occurs_twice() {
+        let header = "file,time_s,\"note, x\",force_model_N,force_N,\"force_model_band_N\"";
+        let (names, kept) = own_columns(header, ',', true);
+        assert_eq!(names, "file_in_recording,time_s,\"note, x\",force_N");
+        assert_eq!(kept, Some(vec![0, 1, 2, 4]));
+        assert_eq!(cells("a,1,\"b, \"\"c\"\"\",2", ','), ["a", "1", "\"b, \"\"c\"\"\"", "2"]);
+        assert_eq!(own_columns("file;time_s", ';', false), ("file;time_s".to_owned(), None));
     }
 }

@@ -42,8 +42,7 @@ impl Reference {
             return Err(Error::new(DataCode::CallInvalid, "a table among several references")
                 .help("give --reference either one table (.pam) or recordings"));
         }
-        let recordings =
-            Recordings { files, import: import.cloned(), filters: Vec::new(), missing: None, sheet: None };
+        let recordings = Recordings { files, import: import.cloned(), ..Recordings::default() };
         Ok(Self::Recordings(diagnose::reference::read(&recordings, None, console)?))
     }
 

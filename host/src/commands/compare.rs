@@ -78,7 +78,7 @@ impl Arguments {
             for text in self.filters.iter().chain(own) {
                 reader.filters.push(recordings::filter(text)?);
             }
-            let mut all = reader.file(path)?;
+            let mut all = reader.campaign([path])?.recordings;
             if all.len() == 1 {
                 return Ok(all.remove(0));
             }

@@ -107,7 +107,7 @@ impl Arguments {
         progress.total(splits * self.muscle.len() as u64);
         let mut cases = Vec::new();
         let mut hashes = Vec::new();
-        let mut failure: Option<Error> = None;
+        let mut failures: Vec<(String, Error)> = Vec::new();
         for path in &self.muscle {
             let muscle = MuscleDescription::read(path)?;
             let campaign;
@@ -120,11 +120,9 @@ impl Arguments {
                 match scored {
                     Ok(held) => Some(held),
                     Err(e) => {
-                        let reported = failure.as_ref().is_some_and(|f| f.to_string() == e.to_string());
-                        if !reported {
-                            console.warning(format!("{}: {e}", muscle.name));
+                        if !failures.iter().any(|(_, f)| f.to_string() == e.to_string()) {
+                            failures.push((muscle.name.clone(), e));
                         }
-                        failure.get_or_insert(e);
                         None
                     }
                 }
@@ -135,9 +133,13 @@ impl Arguments {
             cases.push(Case { muscle, campaign, runs, contractions });
         }
         drop(progress);
-        if cases.iter().all(|c| c.runs.is_none() && c.contractions.is_none())
-            && let Some(e) = failure
-        {
+        // What ends the command is its error, and no warning beside that.
+        let all = cases.iter().all(|c| c.runs.is_none() && c.contractions.is_none());
+        let ends = if all && !failures.is_empty() { Some(failures.remove(0).1) } else { None };
+        for (muscle, e) in &failures {
+            console.warning(format!("{muscle}: {e}"));
+        }
+        if let Some(e) = ends {
             return Err(e);
         }
         let lengths = (0..cases.len()).map(|i| by_others(&cases, i)).collect::<Result<Vec<_>>>()?;

@@ -104,8 +104,8 @@ impl Arguments {
             console.note(format!(
                 "written to {}; next: host fit --muscle {} --import {} {}",
                 path.display(),
-                muscle.display(),
-                path.display(),
+                quoted(muscle),
+                quoted(path),
                 if piped { "-".to_owned() } else { listed(&self.guess) }
             ));
         }
@@ -113,10 +113,23 @@ impl Arguments {
     }
 }
 
+/// A path as a shell takes it: in quotation marks where it holds blanks or signs of the shell.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/\\:._-+=@%~,".contains(c);
+    if text.chars().all(plain) {
+        text
+    } else if cfg!(windows) {
+        format!("\"{text}\"")
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
 /// The files for a command line; of many, the first and how many more.
 fn listed(files: &[PathBuf]) -> String {
     let shown = if files.len() > LISTED { 1 } else { files.len() };
-    let mut names: Vec<String> = files.iter().take(shown).map(|f| f.display().to_string()).collect();
+    let mut names: Vec<String> = files.iter().take(shown).map(|f| quoted(f)).collect();
     if files.len() > shown {
         names.push(format!("… (all {} files)", files.len()));
     }

@@ -148,6 +148,16 @@ fn wrong(answers: &[(&str, String)]) -> Option<String> {
         }
     }
     let error = MuscleDescription::parse(&text(&all)).err()?;
+    // The description is not the user's yet, who has written no quotation marks.
+    if let Some((key, answer)) = answers.last()
+        && !["name", "kind"].contains(key)
+        && answer.parse::<f64>().is_err()
+    {
+        let comma = answer.contains(',');
+        let advice =
+            if comma { "a decimal point, such as 39.16" } else { "a number without a unit, such as 39.16" };
+        return Some(format!("`{answer}` is not a number; write {advice}"));
+    }
     // Who is here already is not sent here.
     let advice = error.advice().filter(|advice| !advice.contains("host new"));
     Some(format!("{}{}", error.cause(), advice.map(|a| format!("; {a}")).unwrap_or_default()))
@@ -188,6 +198,16 @@ mod tests {
         assert!(complaints.is_empty(), "{complaints:?}");
         assert_eq!((muscle.rest_length_mm, muscle.bladder_outer_diameter_mm), (39.16, 3.0));
         assert_eq!(muscle.max_pressure_kPa, None);
+    }
+
+    #[test]
+    fn a_decimal_comma_or_a_unit_is_answered_with_what_to_write() {
+        let (_, complaints) = answered("m\n\n39,16\n39.16 mm\n39.16\n77.4\n3\n0.5\n\n");
+        let expected = [
+            "`39,16` is not a number; write a decimal point, such as 39.16",
+            "`39.16 mm` is not a number; write a number without a unit, such as 39.16",
+        ];
+        assert_eq!(complaints, expected);
     }
 
     #[test]

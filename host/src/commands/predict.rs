@@ -21,7 +21,8 @@ use pam_fit::table_file::TableFile;
     The column force_model_band_N is the half-width of the 95 % confidence interval of the table's force (of its base model, \
     where it has effects). Single readings scatter more.\n\n\
     Several recordings are one history: effects with a memory continue from one to the next. The output is one table; with \
-    several recordings its first column is `file`.")]
+    several recordings its first column is `file`; a column of that name in them becomes `file_in_recording`. Columns of an \
+    earlier prediction are replaced.")]
 pub struct Arguments {
     /// The table.
     #[arg(long, value_name = "TABLE.pam")]
@@ -68,7 +69,15 @@ impl Arguments {
             console.warning(warning);
         }
         if let Some(path) = &self.output {
-            write_whole(path, &to_csv(&campaign, &prediction, self.recordings.import.is_some()))?;
+            let imported = self.recordings.import.is_some();
+            let (csv, whole) = to_csv(&campaign, &prediction, imported);
+            if !whole && !imported {
+                console.warning(
+                    "the output has the columns of time, pressure, displacement and force only: others are kept where all files are CSV files \
+                     with the same header and decimal points",
+                );
+            }
+            write_whole(path, &csv)?;
         }
         if let Some(path) = &self.json {
             let recordings: Vec<_> = campaign

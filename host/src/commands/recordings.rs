@@ -14,7 +14,7 @@ use crate::progress::ProgressLine;
 use pam_data::recording::{Campaign, Hashes, Import, Missing, Reader};
 
 /// Recordings on the command line.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct Recordings {
     /// Recordings of one muscle, in chronological order; `-` is standard input.
     #[arg(required = true, value_name = "REC", value_parser = recording)]
@@ -23,7 +23,7 @@ pub struct Recordings {
     #[arg(long, value_name = "IMPORT.toml")]
     pub import: Option<PathBuf>,
     /// Take only rows where a column has this value, one of several (COLUMN=A,B), or not this value (COLUMN!=VALUE); may be given several
-    /// times.
+    /// times. Several values for one column take the rows with any of them.
     #[arg(long = "where", value_name = "COLUMN=VALUE")]
     pub filters: Vec<String>,
     /// Treatment of rows with empty cells, NaN or `---` in a column that is used [default: error, or as the import description says].
@@ -32,6 +32,9 @@ pub struct Recordings {
     /// The sheet of an Excel or OpenDocument workbook [default: the only one with contents].
     #[arg(long, value_name = "SHEET")]
     pub sheet: Option<String>,
+    /// Whether filters may name values that no row has, as those of other campaigns of a history.
+    #[arg(skip)]
+    pub absent_values: bool,
 }
 
 /// What becomes of rows without a number.
@@ -51,8 +54,16 @@ pub(super) fn recording(text: &str) -> std::result::Result<PathBuf, std::convert
 /// The column and the value of a filter.
 ///
 /// # Errors
-/// A filter without `=`.
+/// A filter without `=`, or with another operator.
 pub(super) fn filter(text: &str) -> Result<(String, String)> {
+    /// What other programs compare with.
+    const OPERATORS: [&str; 9] = ["<=", ">=", "=<", "=>", "==", "=~", "~", "<", ">"];
+    let of = text.find(['=', '<', '>', '~']).map_or("", |at| &text[at..]);
+    if let Some(operator) = OPERATORS.iter().find(|o| of.starts_with(**o)) {
+        return Err(Error::new(DataCode::CallInvalid, format!("a filter does not compare by `{operator}`"))
+            .value(text)
+            .help("a filter takes values with `=` (run=8, run=8,9) or excludes them with `!=` (run!=8)"));
+    }
     let (column, value) = text.split_once('=').ok_or_else(|| {
         Error::new(DataCode::CallInvalid, "a filter without `=`")
             .value(text)
@@ -74,6 +85,7 @@ impl Recordings {
             MissingRows::Skip => Missing::Skip,
         });
         reader.sheet = self.sheet.clone();
+        reader.absent_values = self.absent_values;
         for text in &self.filters {
             reader.filters.push(filter(text)?);
         }
@@ -106,5 +118,24 @@ impl Recordings {
             console.warning(format!("{}: {rows} without a number left out", recording.source.display()));
         }
         Ok(campaign)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_compare_by_equality_and_name_any_other_operator() {
+        let pair = |column: &str, value: &str| (column.to_owned(), value.to_owned());
+        assert_eq!(filter("run = 8").unwrap(), pair("run", "8"));
+        assert_eq!(filter("run!=8,9").unwrap(), pair("run!", "8,9"));
+        for (text, operator) in
+            [("run>=1", ">="), ("run<1", "<"), ("run==1", "=="), ("run=~1", "=~"), ("run <= 2", "<=")]
+        {
+            let error = filter(text).unwrap_err();
+            assert_eq!(error.cause(), format!("a filter does not compare by `{operator}`"));
+        }
+        assert!(filter("run").unwrap_err().cause().contains("without `=`"));
     }
 }

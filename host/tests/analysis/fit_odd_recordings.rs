@@ -358,7 +358,7 @@ fn a_prediction_of_a_recording_with_decimal_commas_can_be_read_again() {
     std::fs::write(&path, text).unwrap();
     let campaign = Reader::new().campaign([&path]).unwrap();
     let foretold = predict(&TableFile { table, about: About::default() }, &campaign).unwrap();
-    std::fs::write(&path, to_csv(&campaign, &foretold, false)).unwrap();
+    std::fs::write(&path, to_csv(&campaign, &foretold, false).0).unwrap();
     let again = Reader::new().file(&path).unwrap().remove(0);
     assert_eq!((again.pressure[7], again.force.unwrap()[7]), (300.5e3, 40.25));
     let written = std::fs::read_to_string(&path).unwrap();

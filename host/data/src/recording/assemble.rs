@@ -16,6 +16,7 @@ use super::decimal;
 use super::import::{FoundZero, Import, NewRun, Value, Zero};
 use super::plausibility::check;
 use super::quantity::Quantity;
+use super::read::FilterValues;
 use super::stroke_zero::{at_largest, first_level, smallest};
 use super::text_column::TextColumn;
 use super::time_of_day;
@@ -32,6 +33,8 @@ pub(super) struct LookupTable {
 /// Columns of a whole file, by what they are for.
 struct Table {
     quantities: HashMap<Quantity, Vec<f64>>,
+    /// Whether the times are times of day without a date.
+    of_day: bool,
     splits: Vec<TextColumn>,
     filters: Vec<TextColumn>,
 }
@@ -45,6 +48,8 @@ pub(super) struct Job<'a> {
     pub muscle_name: Option<&'a str>,
     pub import: &'a Import,
     pub filters: &'a [(String, Value)],
+    /// Takes what the columns of the filters hold.
+    pub filter_values: Option<&'a FilterValues>,
     pub plan: &'a ColumnPlan,
     pub names: &'a [String],
     pub lookup: Option<&'a LookupTable>,
@@ -112,20 +117,22 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
     let plan = job.plan;
     let mut table = Table {
         quantities: HashMap::new(),
+        of_day: false,
         splits: vec![TextColumn::default(); job.import.split_by.len()],
         filters: vec![TextColumn::default(); job.filters.len()],
     };
     let mut keys: HashMap<usize, TextColumn> = HashMap::new();
+    let (mut stamp, mut parts) = (None, Vec::new());
     for (i, role) in plan.roles.iter().enumerate() {
         let texts = std::mem::take(&mut rows.texts[i]);
         match role {
             Role::Quantity(q) => {
-                let mut values = std::mem::take(&mut rows.numbers[i]);
+                table.quantities.insert(*q, std::mem::take(&mut rows.numbers[i]));
                 if let Want::Stamp { scale, offset, .. } = plan.wanted[i].want {
-                    time_of_day::past_midnight(&mut values, scale, offset);
+                    stamp = Some((scale, offset));
                 }
-                table.quantities.insert(*q, values);
             }
+            Role::TimePart => parts.push(i),
             Role::Coded(q, values) => {
                 let name = &job.names[plan.wanted[i].index];
                 let code = |row: usize| {
@@ -149,6 +156,15 @@ fn sort_columns(job: &Job<'_>, rows: &mut Rows) -> Result<Table> {
             Role::Key(n) => {
                 keys.insert(*n, texts);
             }
+        }
+    }
+    if let Some(times) = table.quantities.get_mut(&Quantity::Time) {
+        for part in parts {
+            times.iter_mut().zip(&rows.numbers[part]).for_each(|(time, part)| *time += part);
+        }
+        if let Some((scale, offset)) = stamp {
+            table.of_day = time_of_day::are(times, scale, offset);
+            time_of_day::past_midnight(times, scale, offset);
         }
     }
     if !plan.looked_up.is_empty()
@@ -218,6 +234,9 @@ fn keep(job: &Job<'_>, table: &Table, rows: usize) -> Result<Option<Vec<bool>>> 
     let mut rest_length = false;
     for ((name, value), texts) in job.filters.iter().zip(&table.filters) {
         rest_length |= value.is_of_length();
+        if let Some(values) = job.filter_values {
+            values.note(name, &texts.dictionary);
+        }
         let fits = |word: &String| passes(job, name, value, word);
         let verdicts: Vec<bool> = texts.dictionary.iter().map(fits).collect::<Result<_>>()?;
         for (kept, code) in keep.iter_mut().zip(&texts.codes) {
@@ -381,6 +400,7 @@ fn take(
     labels: &[String],
 ) -> Result<Recording> {
     let stretch = rows.as_deref().and_then(contiguous);
+    let time_of_day = table.of_day;
     let mut column = |quantity: Quantity| match (&rows, &stretch) {
         // The whole file: its columns move over without a copy.
         (None, _) => table.quantities.remove(&quantity),
@@ -437,6 +457,7 @@ fn take(
         labels,
         rest_length,
         time: column(Quantity::Time).unwrap_or_default(),
+        time_of_day,
         pressure: column(Quantity::Pressure).unwrap_or_default(),
         stroke,
         force: column(Quantity::Force),

@@ -4,7 +4,7 @@ use super::decimal;
 use super::line::{Cells, is_blank, is_remark, trim_end};
 use super::text_column::TextColumn;
 use super::usual_line::UsualLine;
-use crate::date::{DateOrder, time_stamp_in};
+use crate::date::{DateOrder, date_in, time_stamp_in};
 
 /// How a text file is cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +35,8 @@ pub(super) enum Want {
     Number { scale: f64, offset: f64 },
     /// A date with a time of day, or a time of day alone: s = its seconds · scale + offset.
     Stamp { scale: f64, offset: f64, order: DateOrder },
+    /// A date alone: s since 1970.
+    Date { order: DateOrder },
     /// The text itself, from a small vocabulary.
     Text,
 }
@@ -53,6 +55,8 @@ pub(super) enum Fault {
     NotANumber,
     /// Neither a date with a time of day nor a time of day.
     NotAStamp,
+    /// No date alone.
+    NotADate,
     NotFinite,
     Width {
         found: usize,
@@ -114,7 +118,7 @@ impl Fault {
     fn is_missing(&self, value: &str) -> bool {
         match self {
             Self::Empty | Self::NotFinite => true,
-            Self::NotANumber | Self::NotAStamp => only_signs(value),
+            Self::NotANumber | Self::NotAStamp | Self::NotADate => only_signs(value),
             Self::Width { .. } | Self::OpenQuote => false,
         }
     }
@@ -243,6 +247,13 @@ fn row(
                         None => return Err(explain_stamp(start, width, index)),
                     }
                 }
+                Want::Date { order } => {
+                    let cell = cells.text().map_err(|()| open_quote(line))?;
+                    match date_in(&cell, order) {
+                        Some(seconds) => out.numbers[next].push(seconds),
+                        None => return Err(explain_date(start, width, index)),
+                    }
+                }
                 Want::Text => {
                     let cell = cells.text().map_err(|()| open_quote(line))?;
                     out.texts[next].push(&cell);
@@ -305,6 +316,13 @@ fn explain(mut cells: Cells<'_>, width: usize, index: usize) -> CellError {
 fn explain_stamp(cells: Cells<'_>, width: usize, index: usize) -> CellError {
     let (cell, value, fault) = explain(cells, width, index);
     let fault = if fault == Fault::NotANumber { Fault::NotAStamp } else { fault };
+    (cell, value, fault)
+}
+
+/// Why a cell is not a date.
+fn explain_date(cells: Cells<'_>, width: usize, index: usize) -> CellError {
+    let (cell, value, fault) = explain(cells, width, index);
+    let fault = if fault == Fault::NotANumber { Fault::NotADate } else { fault };
     (cell, value, fault)
 }
 

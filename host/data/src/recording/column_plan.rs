@@ -14,6 +14,8 @@ pub(super) enum Role {
     Quantity(Quantity),
     /// A quantity given as words, with the value of each word in SI units.
     Coded(Quantity, BTreeMap<String, f64>),
+    /// What is added to the time, s: its date, or its parts of a second.
+    TimePart,
     /// The n-th column that sets recordings apart.
     Split(usize),
     /// The n-th row filter.
@@ -75,6 +77,14 @@ impl Context<'_> {
         }
     }
 
+    /// As [`Self::find`], of a column that only the file itself can have.
+    fn find_here(&self, names: &[String], column: &ColumnRef) -> Result<Found> {
+        match self.find(names, column)? {
+            Found::LookedUp(_) => Err(missing(&column.to_string(), std::iter::empty(), names)),
+            here => Ok(here),
+        }
+    }
+
     fn find_name(&self, names: &[String], name: &str) -> Result<Found> {
         let mut hits = names.iter().enumerate().filter(|(_, n)| *n == name).map(|(i, _)| i);
         match (hits.next(), hits.next()) {
@@ -118,6 +128,13 @@ pub(super) fn plan(names: &[String], context: &Context<'_>) -> Result<ColumnPlan
         let at = context.find(names, &column.column)?;
         let (role, want) = described(quantity, column);
         columns.push((at, role, want));
+        let date =
+            column.date.as_ref().zip(column.stamp(quantity)).map(|(c, order)| (c, Want::Date { order }));
+        let fraction = column.fraction.as_ref().and_then(|f| Some((&f.column, f.scale()?)));
+        let fraction = fraction.map(|(c, scale)| (c, Want::Number { scale, offset: 0.0 }));
+        for (part, want) in date.into_iter().chain(fraction) {
+            columns.push((context.find_here(names, part)?, Role::TimePart, want));
+        }
     }
     plan.stroke = stroke_source(names, context, &plan)?;
     for quantity in Quantity::IN_HEADERS {

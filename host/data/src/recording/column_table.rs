@@ -4,7 +4,7 @@ use super::blocks::Rows;
 use super::cells::{Want, Wanted};
 use super::import::Missing;
 use super::text_column::TextColumn;
-use crate::date::time_stamp_in;
+use crate::date::{date_in, time_stamp_in};
 use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 
@@ -85,6 +85,10 @@ pub(super) fn select(table: &ColumnTable, wanted: &[Wanted], missing: Missing) -
             }
             Want::Stamp { scale, offset, order } => {
                 let seconds = |text: &str| time_stamp_in(text, order).map(|v| v * scale + offset);
+                numbers = times(column, seconds, keep.as_deref()).map_err(|e| e.column(name))?;
+            }
+            Want::Date { order } => {
+                let seconds = |text: &str| date_in(text, order);
                 numbers = times(column, seconds, keep.as_deref()).map_err(|e| e.column(name))?;
             }
             Want::Text => texts = as_texts(column, keep.as_deref()),

@@ -33,6 +33,8 @@ pub struct Recording {
     pub rest_length: Option<f64>,
     /// Time in seconds, strictly increasing.
     pub time: Vec<f64>,
+    /// Whether the time is one of day without a date: such times do not show the order of recordings.
+    pub time_of_day: bool,
     /// Gauge pressure as measured, Pa.
     pub pressure: Vec<f64>,
     /// ΔL: contraction stroke in metres, positive when the muscle shortens (a push-PAM's rod extends).

@@ -23,6 +23,12 @@
 //! positive = "extension"            # or "contraction"
 //! zero = "longest"                  # stroke 0 is at the greatest length; or "first", "largest-force", or a number
 //!
+//! [columns.time]
+//! column = "Time"
+//! unit = "timestamp"
+//! date = "Date"                     # dates in a column beside times of day
+//! fraction = { column = "Milliseconds", unit = "ms" }   # parts of the second in a column beside: "s", "ms", "us", "ns"
+//!
 //! [columns.direction]
 //! column = "phase"
 //! values = { up = 1, down = -1 }    # text to number, for any quantity
@@ -65,8 +71,8 @@ use crate::error::{DataCode, Error, Result, nearest};
 use crate::file_kind::FileKind;
 use crate::toml_errors::toml_error;
 
-pub(super) use column::time_stamp_unit;
-pub use column::{Column, ColumnRef, FoundZero, Positive, Zero};
+pub use column::{Column, ColumnRef, FoundZero, Fraction, Positive, Zero};
+pub(super) use column::{FRACTIONS, time_stamp_unit};
 pub use side_by_side::SideBySide;
 pub use value::Value;
 
@@ -199,7 +205,7 @@ impl Import {
         let invalid = |cause: String| Error::new(DataCode::ImportInvalid, cause);
         for (name, column) in &self.columns {
             let quantity = self::quantity(name)?;
-            if column.column == ColumnRef::Number(0) {
+            if std::iter::once(&column.column).chain(column.further()).any(|c| *c == ColumnRef::Number(0)) {
                 return Err(invalid("columns are counted from 1".into()).column(name));
             }
             if !(column.scale.is_finite() && column.scale != 0.0 && column.offset.is_finite()) {
@@ -215,6 +221,7 @@ impl Import {
                     .column(name)
                     .help(format!("use {}, with scale and offset for anything else", quantity.unit_list())));
             }
+            self::check_parts(quantity, column).map_err(|e| e.column(name))?;
             let arbitrary = column.positive.is_some() || column.zero.is_some();
             if arbitrary && quantity != Quantity::Displacement {
                 return Err(invalid("`positive` and `zero` are for displacements".into()).column(name));
@@ -290,7 +297,8 @@ impl Import {
 
     /// The names of all columns of the file that the description uses; `None` where it gives one by its number.
     pub(super) fn names_in_file(&self) -> Option<Vec<String>> {
-        let described = self.columns.values().map(|c| match &c.column {
+        let columns = self.columns.values().flat_map(|c| std::iter::once(&c.column).chain(c.further()));
+        let described = columns.map(|column| match column {
             ColumnRef::Name(name) => Some(name.clone()),
             ColumnRef::Number(_) => None,
         });
@@ -303,6 +311,26 @@ impl Import {
     pub(super) fn described(&self, quantity: Quantity) -> Option<&Column> {
         self.columns.get(quantity.name())
     }
+}
+
+/// Checks the columns of dates and of parts of a second beside a time.
+fn check_parts(quantity: Quantity, column: &Column) -> Result<()> {
+    let invalid = |cause: &str| Error::new(DataCode::ImportInvalid, cause);
+    if column.further().next().is_some() && quantity != Quantity::Time {
+        return Err(invalid("`date` and `fraction` are for the time"));
+    }
+    if column.date.is_some() && column.stamp(quantity).is_none() {
+        return Err(
+            invalid("`date` is the date of times of day").help("write unit = \"timestamp\" beside it")
+        );
+    }
+    if let Some(fraction) = column.fraction.as_ref().filter(|f| f.scale().is_none()) {
+        let units: Vec<String> = FRACTIONS.iter().map(|(unit, _)| format!("\"{unit}\"")).collect();
+        return Err(invalid("this is no unit of parts of a second")
+            .value(&fraction.unit)
+            .help(format!("use {}", units.join(", "))));
+    }
+    Ok(())
 }
 
 /// Compiles a regular expression of a description.

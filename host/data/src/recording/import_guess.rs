@@ -21,6 +21,7 @@ mod absolute;
 mod constant_pressure;
 mod file_name_length;
 mod forms;
+mod joined_time;
 mod layout;
 mod lookup;
 mod names;
@@ -77,6 +78,10 @@ pub struct GuessedColumn {
     pub from_longest: bool,
     /// Words with their direction.
     pub values: Vec<(String, i8)>,
+    /// Of a time of day, the column of the dates.
+    pub date: Option<Source>,
+    /// Of a time, the column of the parts of a second that it lacks, and their unit.
+    pub fraction: Option<(Source, &'static str)>,
     /// The least and the greatest cell.
     pub range: Option<(f64, f64)>,
 }
@@ -117,6 +122,8 @@ pub struct Guess {
     pub thousands: Option<char>,
     /// Whether rows without a number in a column that is used are left out.
     pub skip_missing: bool,
+    /// Seconds between rows, where the lines above the table say it and no column is the time.
+    pub sample_interval_s: Option<f64>,
     /// Constants that are taken from the file's name or from the lines above the table.
     pub patterns: Vec<GuessedPattern>,
     /// Columns that set runs apart.
@@ -154,7 +161,7 @@ impl Guess {
             let scaled = c.scale != 1.0 || c.offset != 0.0;
             !(scaled || c.extension || c.from_longest || !c.values.is_empty())
         };
-        let one = !self.new_run_by_clock && self.side_by_side.is_none();
+        let one = !self.new_run_by_clock && self.side_by_side.is_none() && self.sample_interval_s.is_none();
         let whole = one && self.split_by.is_empty() && self.patterns.is_empty() && self.filters.is_empty();
         whole && self.lookup.is_none() && self.columns.iter().all(plain)
     }
@@ -189,10 +196,11 @@ pub fn guess(path: &Path, sheet: Option<&str>) -> Result<Guess> {
 /// and their names may say which one.
 ///
 /// # Errors
-/// A file that cannot be read, or that holds no table. Others that cannot be read are left out.
+/// A file that cannot be read, or that holds no table; others whose columns have other places or units, where nothing else would notice
+/// it. Others that cannot be read are left out.
 pub fn guess_among(path: &Path, others: &[PathBuf], sheet: Option<&str>) -> Result<Guess> {
     let sample = Sample::read(path, sheet).map_err(|e| e.file(path))?;
-    let mut guess = roles::assign(path, &sample, &Others::of(others, sheet));
+    let mut guess = roles::assign(path, &sample, &Others::of(others, sheet)).map_err(|e| e.file(path))?;
     guess.description = text::description(&guess);
     Ok(guess)
 }

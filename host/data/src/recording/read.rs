@@ -19,6 +19,7 @@ use super::lookup::read_lookup;
 use super::mcap::Needed;
 use super::quantity::{HeaderName, Quantity, parse_header};
 use super::source;
+use super::time_of_day;
 use crate::bounds::Budget;
 use crate::error::{DataCode, Error, Result};
 use crate::file_kind::FileKind;
@@ -27,11 +28,14 @@ use crate::progress::Progress;
 
 mod constants;
 mod error_messages;
+mod filter_values;
 mod grid;
 mod side_by_side;
 
 use constants::Constants;
+pub(super) use error_messages::unpacked;
 use error_messages::{block_error, rows_error};
+pub use filter_values::FilterValues;
 
 /// How to read recordings, and what is known of the muscle that made them.
 #[derive(Debug, Clone, Default)]
@@ -42,8 +46,13 @@ pub struct Reader<'a> {
     pub muscle_name: Option<&'a str>,
     /// For files that are not in our own form.
     pub import: Option<&'a Import>,
-    /// Further row filters: column and the text or number that it must have, as [`Value::of_option`] reads them.
+    /// Further row filters: column and the text or number that it must have, as [`Value::of_option`] reads them. Several on one column take
+    /// the values of each, and leave out what one of them excludes.
     pub filters: Vec<(String, String)>,
+    /// Whether these may name values that no row of a campaign has.
+    pub absent_values: bool,
+    /// Takes what the columns of these hold; a campaign has its own.
+    pub filter_values: Option<Arc<FilterValues>>,
     /// What becomes of rows without a number in a column that is used; as the import description says where it is `None`.
     pub missing: Option<Missing>,
     /// The sheet of a workbook; as the import description says where it is `None`.
@@ -80,6 +89,15 @@ impl Hashes {
 const LOOKED_BELOW: usize = 100;
 #[cfg(feature = "excel")]
 use super::workbook::is_one as workbook_magic;
+
+/// Whether a text has numbers such as `"0,25"` in quotation marks.
+#[cfg(feature = "excel")]
+fn has_commas_in_quotes(text: &[u8]) -> bool {
+    text.split(|b| *b == b'"').skip(1).step_by(2).any(|cell| {
+        let bare = cell.strip_prefix(b"-").unwrap_or(cell);
+        bare.contains(&b',') && bare.iter().all(|b| b.is_ascii_digit() || *b == b',')
+    })
+}
 
 /// Distinguishes workbooks from text in builds that do not read workbooks.
 #[cfg(not(feature = "excel"))]
@@ -123,9 +141,11 @@ impl<'a> Reader<'a> {
     pub fn campaign<P: AsRef<Path>>(&self, paths: impl IntoIterator<Item = P>) -> Result<Campaign> {
         let mut recordings = Vec::new();
         let mut budget = Budget::default();
+        let values = Arc::new(FilterValues::of(&self.filters));
+        let reader = Self { filter_values: Some(Arc::clone(&values)), ..self.clone() };
         for path in paths {
             let path = path.as_ref();
-            let read = self.file(path)?;
+            let read = reader.file(path)?;
             budget.take(read.iter().map(Recording::values).sum()).map_err(|e| {
                 e.file(path).help("the recordings together are too long: leave some out, or record fewer samples per second")
             })?;
@@ -134,7 +154,13 @@ impl<'a> Reader<'a> {
         if recordings.is_empty() {
             return Err(Error::new(DataCode::CallInvalid, "no recording was given"));
         }
-        Ok(Campaign::new(recordings))
+        if !self.absent_values {
+            values.check()?;
+        }
+        let remark = time_of_day::on_following_days(&mut recordings);
+        let mut campaign = Campaign::new(recordings);
+        campaign.warnings.extend(remark);
+        Ok(campaign)
     }
 
     /// Reads one file: one recording, or several when the import description splits it.
@@ -190,8 +216,14 @@ impl<'a> Reader<'a> {
         let mut description = self.description();
         let sheet = super::workbook::sheet(path, &mut source, description.sheet.as_deref())?;
         if description.delimiter.is_some() || description.decimal != Decimal::Point {
+            // The numbers of a sheet have points, also where the text files of a bench have commas. Numbers that it holds as text keep theirs.
+            let as_text = description.decimal == Decimal::Comma && has_commas_in_quotes(&sheet.text);
             let own = description.into_owned();
-            description = Cow::Owned(Import { delimiter: None, decimal: Decimal::Point, ..own });
+            description = Cow::Owned(if as_text {
+                Import { delimiter: Some("comma".into()), ..own }
+            } else {
+                Import { delimiter: None, decimal: Decimal::Point, ..own }
+            });
         }
         source.size = Some(sheet.text.len() as u64);
         source.reader = Box::new(std::io::Cursor::new(sheet.text));
@@ -327,14 +359,10 @@ impl<'a> Reader<'a> {
         let lookup = import.lookup.as_ref().map(|l| read_lookup(path, &l.file)).transpose()?;
         let mut filters: Vec<(String, Value)> =
             import.filters.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
-        for (name, text) in &self.filters {
-            let (name, value) = Value::of_option(name, text);
-            // A filter of the call replaces that of the description; what it excludes is excluded beside that.
-            if !matches!(value, Value::Not { .. }) {
-                filters.retain(|(n, _)| *n != name);
-            }
-            filters.push((name, value));
-        }
+        let called = combined(&self.filters);
+        // A filter of the call replaces that of the description; what it excludes is excluded beside that.
+        filters.retain(|(name, _)| !called.iter().any(|(n, value)| n == name && !value.excludes()));
+        filters.extend(called);
         let context = Context {
             import,
             foreign: self.import.is_some(),
@@ -361,6 +389,7 @@ impl<'a> Reader<'a> {
             muscle_name: self.muscle_name,
             import,
             filters: &layout.filters,
+            filter_values: self.filter_values.as_deref(),
             plan: &layout.plan,
             names,
             lookup: layout.lookup.as_ref(),
@@ -369,6 +398,19 @@ impl<'a> Reader<'a> {
         };
         assemble(&job, rows)
     }
+}
+
+/// The filters of a call: the values that several take from one column are one list, what they exclude is excluded by each.
+fn combined(filters: &[(String, String)]) -> Vec<(String, Value)> {
+    let mut all: Vec<(String, Value)> = Vec::new();
+    for (name, text) in filters {
+        let (name, value) = Value::of_option(name, text);
+        match all.iter_mut().find(|(n, first)| *n == name && !first.excludes() && !value.excludes()) {
+            Some((_, first)) => *first = Value::AnyOf(vec![first.clone(), value]),
+            None => all.push((name, value)),
+        }
+    }
+    all
 }
 
 /// The first of the next lines, counted from 1, that names columns as a header does: above it a program may have written other things.

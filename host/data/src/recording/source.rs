@@ -179,6 +179,19 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
         );
     }
     let start = &first[..first.len().min(1 << 16)];
+    if is_json(start) {
+        return not_text(
+            "the file is JSON, which is not read",
+            "write it as CSV, with one row for each reading: in Python, pandas.read_json(FILE, lines=True).to_csv(OUT, index=False)",
+        );
+    }
+    let end = start.iter().rposition(|b| *b != 0).map_or(0, |at| at + 1);
+    if (1..start.len()).contains(&end) && memchr::memchr(0, &start[..end]).is_none() {
+        return not_text(
+            "the file ends in zero bytes: the program that wrote it was stopped before it wrote the last rows",
+            "cut the zero bytes off, as `tr -d '\\000' < FILE > NEW` does",
+        );
+    }
     let zeros = memchr::memchr_iter(0, start).count();
     if zeros > 0 && zeros * 3 > start.len() && zeros * 3 < start.len() * 2 {
         return not_text(
@@ -193,6 +206,16 @@ pub(super) fn check_text(first: &[u8]) -> Result<usize> {
         );
     }
     Ok(if first.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 })
+}
+
+/// Whether a text begins as JSON does, with an object that has a name, or with a list.
+fn is_json(text: &[u8]) -> bool {
+    let mut signs = text.iter().filter(|b| !b.is_ascii_whitespace());
+    match (signs.next(), signs.next()) {
+        (Some(b'{'), Some(b'"')) => true,
+        (Some(b'['), Some(b'{')) => signs.next() == Some(&b'"'),
+        _ => false,
+    }
 }
 
 #[cfg(test)]

@@ -49,6 +49,7 @@ fn stage(recording: &Recording, number: usize, hold: &Hold) -> Recording {
         }),
         skipped: 0,
         rest_length: recording.rest_length,
+        time_of_day: recording.time_of_day,
         time: recording.time[rows.clone()].to_vec(),
         pressure: recording.pressure[rows.clone()].to_vec(),
         stroke: recording.stroke[rows.clone()].to_vec(),

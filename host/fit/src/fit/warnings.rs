@@ -43,17 +43,38 @@ fn rows(solution: &Solution, wanted: PointUse) -> usize {
     used.filter(|(_, u)| **u == wanted).map(|(p, _)| p.rows as usize).sum()
 }
 
+/// Whether the lowest force is a code for missing readings, such as −999: a force of the wrong sign is far below zero in most rows. `forces`:
+/// means with their numbers of rows.
+fn is_code(low: f64, forces: impl Iterator<Item = (f64, u32)>) -> bool {
+    /// Of the lowest force, from which a reading is far below zero; and the share of rows that a code has at most.
+    const FAR: (f64, f64) = (0.1, 0.2);
+    let (far, all) = forces.fold((0.0, 0.0), |(far, all), (force, rows)| {
+        let rows = f64::from(rows);
+        (far + if force < FAR.0 * low { rows } else { 0.0 }, all + rows)
+    });
+    far < FAR.1 * all
+}
+
 /// Whether sign, units and dimensions can be right.
 fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
     let force = &solution.problem.points.force;
     // A code for missing readings, such as −999, is not a force.
     if solution.problem.clips.0.is_none() && -force.low > WRONG_SIGN * force.high {
-        out.push(format!(
-            "the force ranges from {:.1} N to {:.1} N: force is positive as the muscle pulls; invert its sign with scale = -1 in an \
+        let forces = solution.problem.points.list.iter().map(|p| (p.force, p.rows));
+        out.push(if is_code(force.low, forces) {
+            format!(
+                "the force is {:.1} N in a few rows, far from the others: if this is a code for missing readings, leave these rows out, such as \
+                 by empty cells and --missing skip",
+                force.low
+            )
+        } else {
+            format!(
+                "the force ranges from {:.1} N to {:.1} N: force is positive as the muscle pulls; invert its sign with scale = -1 in an \
              import description",
             force.low,
             force.high.max(0.0)
-        ));
+        )
+        });
     }
     out.extend(solution.unusual_share_of_braid());
     if mean_error > NO_MUSCLE {
@@ -292,5 +313,19 @@ fn between_pressures(left_out: &[Option<f64>], out: &mut Vec<String>) {
         out.push(format!(
             "the worst left-out pressure has a mean error of {worst:.1} % of the blocked force: test more pressures"
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_code;
+
+    #[test]
+    fn a_code_for_missing_readings_is_no_wrong_sign() {
+        let forces = |coded: u32, sign: f64| {
+            (0..100).map(move |n| (if n < coded { -999.0 } else { sign * f64::from(n) }, 3))
+        };
+        assert!(is_code(-999.0, forces(2, 1.0)));
+        assert!(!is_code(-99.0, forces(0, -1.0)));
     }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::super::recordings::Recordings;
+use super::super::recordings::{Recordings, filter as filter_of};
 use super::super::reports;
 use super::Arguments;
 use crate::console::Console;
@@ -88,10 +88,9 @@ fn held(recordings: &Recordings, console: &Console) -> Result<Campaign> {
     import.constants.insert("displacement_mm".into(), 0.0);
     let mut reader = Reader::new().import(Some(&import));
     for filter in &recordings.filters {
-        if let Some((column, value)) = filter.split_once('=') {
-            reader.filters.push((column.trim().to_owned(), value.trim().to_owned()));
-        }
+        reader.filters.push(filter_of(filter)?);
     }
+    reader.absent_values = recordings.absent_values;
     console.warning("no column of displacement, length or contraction: the length counts as held");
     reader.campaign(&recordings.files)
 }
@@ -117,7 +116,13 @@ fn before(arguments: &Arguments, muscle: Option<&MuscleDescription>, console: &C
         _ => {
             let own = &arguments.changed.reference_where;
             let filters = if own.is_empty() { arguments.recordings.filters.clone() } else { own.clone() };
-            let recordings = Recordings { files: files.clone(), filters, ..arguments.recordings.clone() };
+            // Values of --where may be of the other side only.
+            let recordings = Recordings {
+                files: files.clone(),
+                filters,
+                absent_values: own.is_empty(),
+                ..arguments.recordings.clone()
+            };
             Ok(Before::Recordings(read(&recordings, muscle, console)?))
         }
     }

@@ -131,6 +131,7 @@ pub(super) fn read(request: &Request<'_>, console: &Console) -> Result<Vec<Found
             filters: request.filters.to_vec(),
             missing: None,
             sheet: None,
+            absent_values: true,
         };
         let campaign = read_campaign(&recordings, request.muscle, console)?;
         let dated =

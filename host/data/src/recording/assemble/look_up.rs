@@ -33,7 +33,7 @@ pub(super) fn look_up(
             }
             Role::Split(n) => lines.iter().for_each(|l| table.splits[*n].push(&cell(l))),
             Role::Filter(n) => lines.iter().for_each(|l| table.filters[*n].push(&cell(l))),
-            Role::Key(_) => {}
+            Role::Key(_) | Role::TimePart => {}
         }
     }
     Ok(())
@@ -105,6 +105,6 @@ fn value(cell: &str, column: &LookedUp) -> Result<f64> {
             let seconds = time_stamp_in(cell, order).map(|v| v * scale + offset);
             seconds.ok_or_else(|| error("not a time stamp in the lookup table"))
         }
-        (Want::Text, _) => Ok(0.0),
+        (Want::Text | Want::Date { .. }, _) => Ok(0.0),
     }
 }

@@ -1,7 +1,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::recording::{Import, Reader, Recording};
+use crate::recording::import_guess::guess;
+use crate::recording::{Import, Quantity, Reader, Recording};
 
 /// The fixtures are made by `fixtures/make.py` with SciPy, h5py, pandas, pyarrow and polars; all hold the same 40 rows.
 fn fixture(name: &str) -> PathBuf {
@@ -69,6 +70,17 @@ fn columns_of_a_matrix_are_taken_by_their_numbers() {
         let read = Reader::new().import(Some(&import)).file(&fixture(name));
         assert_the_rows_of_the_text(name, &read.unwrap_or_else(|e| panic!("{name}: {e}")));
     }
+}
+
+#[test]
+fn columns_of_a_matrix_have_no_names_to_guess_from() {
+    if !is_read("matrix.h5") {
+        return;
+    }
+    let guessed = guess(&fixture("matrix.h5"), None).unwrap();
+    assert!(guessed.columns.iter().all(|c| c.quantity == Quantity::Time), "{}", guessed.description);
+    let unknown = guessed.all_unknown();
+    assert!(unknown.starts_with("the columns of a matrix have no names"), "{unknown}");
 }
 
 #[test]

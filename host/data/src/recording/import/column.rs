@@ -80,6 +80,31 @@ pub struct Column {
     pub zero: Option<Zero>,
     /// Text to number, for columns of words.
     pub values: Option<BTreeMap<String, f64>>,
+    /// For times of day: the column of the dates.
+    pub date: Option<ColumnRef>,
+    /// For times: the column of the parts of a second that the time lacks.
+    pub fraction: Option<Fraction>,
+}
+
+/// Parts of a second in a column of their own, such as milliseconds beside a time of day.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fraction {
+    /// The column of the file.
+    pub column: ColumnRef,
+    /// What it counts: `s`, `ms`, `us`, or `ns`.
+    pub unit: String,
+}
+
+/// The units of parts of a second, s.
+pub(in crate::recording) const FRACTIONS: [(&str, f64); 4] =
+    [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+
+impl Fraction {
+    /// Its unit, s; `None` where that is not known.
+    pub(in crate::recording) fn scale(&self) -> Option<f64> {
+        FRACTIONS.iter().find(|(unit, _)| self.unit == *unit).map(|(_, scale)| *scale)
+    }
 }
 
 /// The units of a time that is written as a date with a time of day, or as a time of day alone, and how dates with slashes are read.
@@ -95,6 +120,11 @@ pub(in crate::recording) fn time_stamp_unit(order: DateOrder) -> &'static str {
 }
 
 impl Column {
+    /// The columns beside its own that it is read from.
+    pub(in crate::recording) fn further(&self) -> impl Iterator<Item = &ColumnRef> {
+        self.date.iter().chain(self.fraction.iter().map(|f| &f.column))
+    }
+
     /// How its cells are read, where they are time stamps.
     pub(in crate::recording) fn stamp(&self, quantity: Quantity) -> Option<DateOrder> {
         let found = TIME_STAMPS.iter().find(|(unit, _)| self.unit.as_deref() == Some(unit));

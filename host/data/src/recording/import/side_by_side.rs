@@ -25,8 +25,8 @@ impl Import {
         if !(2..=MOST_BESIDE).contains(&recordings) || columns == 0 {
             return invalid("recordings must be from 2 to 1000, and columns 1 or more");
         }
-        if self.columns.values().any(|c| matches!(c.column, ColumnRef::Name(_))) || !self.split_by.is_empty()
-        {
+        let all = || self.columns.values().flat_map(|c| std::iter::once(&c.column).chain(c.further()));
+        if all().any(|c| matches!(c, ColumnRef::Name(_))) || !self.split_by.is_empty() {
             return invalid("recordings side by side need all columns by their numbers, and no split_by");
         }
         Ok(())
@@ -37,8 +37,11 @@ impl Import {
         let step = self.side_by_side.map_or(0, |s| s.columns);
         let mut own = Self { side_by_side: None, ..self.clone() };
         for column in own.columns.values_mut() {
-            if let ColumnRef::Number(number) = &mut column.column {
-                *number += n * step;
+            let further = column.date.iter_mut().chain(column.fraction.iter_mut().map(|f| &mut f.column));
+            for reference in std::iter::once(&mut column.column).chain(further) {
+                if let ColumnRef::Number(number) = reference {
+                    *number += n * step;
+                }
             }
         }
         own

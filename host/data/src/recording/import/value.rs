@@ -45,6 +45,11 @@ impl Value {
         }
     }
 
+    /// Whether it says what does not pass.
+    pub(in crate::recording) fn excludes(&self) -> bool {
+        matches!(self, Self::Not { .. })
+    }
+
     /// Whether it depends on the muscle's rest length.
     pub(in crate::recording) fn is_of_length(&self) -> bool {
         match self {

@@ -3,7 +3,7 @@
 use super::Note;
 use super::layout::{Layout, cells, is_missing, number};
 use super::sample::SampleColumn;
-use crate::date::{DateOrder, time_stamp_in};
+use crate::date::{DateOrder, date_in, time_stamp_in};
 use crate::recording::line::is_remark;
 use crate::recording::thousands::{self, SEPARATORS};
 use crate::statistics::extremes;
@@ -65,7 +65,9 @@ pub(super) fn find<'a>(
     forms: &mut Forms,
 ) -> Found {
     let mut found = Found::default();
-    for (n, column) in columns.iter().enumerate().filter(|(_, c)| c.texts > 0 && !c.is_stamped()) {
+    for (n, column) in
+        columns.iter().enumerate().filter(|(_, c)| c.texts > 0 && !c.is_stamped() && !c.is_dated())
+    {
         let first = column.first_text.as_deref().unwrap_or_default();
         if first.matches('/').count() == 2 {
             dates(column, first, &cells(n), forms, &mut found);
@@ -106,7 +108,8 @@ fn separators(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Fo
 fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, found: &mut Found) {
     let span = |order: DateOrder| {
         let present = cells.iter().filter(|c| !is_missing(c));
-        let seconds: Option<Vec<f64>> = present.map(|c| time_stamp_in(c, order)).collect();
+        let seconds: Option<Vec<f64>> =
+            present.map(|c| time_stamp_in(c, order).or_else(|| date_in(c, order))).collect();
         let range = extremes(&seconds?);
         Some(range.1 - range.0)
     };
@@ -120,9 +123,11 @@ fn dates(column: &SampleColumn, first: &str, cells: &[&str], forms: &mut Forms, 
             (DateOrder::DayFirst, "otherwise months would pass between the rows")
         }
         (Some(_), Some(_)) => {
+            let alone = date_in(first, DateOrder::DayFirst).is_some();
+            let which = if alone { format!("date = \"{}\" and ", column.header) } else { String::new() };
             let text = format!(
                 "{} holds dates such as `{first}`, whose month may be the first or the second number: describe it under [columns.time] with \
-                 unit = \"timestamp-month-first\" or \"timestamp-day-first\"",
+                 {which}unit = \"timestamp-month-first\" or \"timestamp-day-first\"",
                 column.header
             );
             found.unknown.push(Note::on_column(&column.header, column.quantity_by_name(), text));

@@ -225,7 +225,28 @@ fn dialect(lines: &[&[u8]]) -> Option<(Dialect, usize)> {
             }
         }
     }
-    best.map(|(_, dialect, width)| (dialect, width))
+    let (_, dialect, width) = best?;
+    let other = Dialect { decimal_comma: !dialect.decimal_comma, ..dialect };
+    // `7,133.3` proves the decimal sign of a file whose other cells, such as `205,320`, may have either.
+    let proved = is_possible(body, other, true) && !is_possible(body, dialect, false);
+    Some((if proved { other } else { dialect }, width))
+}
+
+/// Whether all cells of digits are numbers with this decimal sign, with separators of thousands or without; `proved`: and one of them can only
+/// be one with both.
+fn is_possible(lines: &[&[u8]], dialect: Dialect, proved: bool) -> bool {
+    let comma = dialect.decimal_comma;
+    let of_digits = |c: &&String| {
+        let bare = c.trim().trim_start_matches(['-', '+']);
+        bare.starts_with(|c: char| c.is_ascii_digit())
+            && bare.chars().all(|c| c.is_ascii_digit() || ",.".contains(c))
+    };
+    let rows: Vec<Vec<String>> = lines.iter().filter_map(|l| cells(l, dialect)).collect();
+    let mut all = rows.iter().flatten().filter(of_digits).peekable();
+    let separator = if comma { b'.' } else { b',' };
+    let certain = |c: &String| has_thousands(c, comma) && thousands::is_certain(c, separator, comma);
+    let one = !proved || rows.iter().flatten().filter(of_digits).any(certain);
+    one && all.peek().is_some() && all.all(|c| number_of(c, comma) || has_thousands(c, comma))
 }
 
 fn usual_width(rows: &[Vec<String>]) -> Option<usize> {

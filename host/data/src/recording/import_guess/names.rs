@@ -27,6 +27,10 @@ impl Name {
     pub(super) fn of(header: &str) -> Self {
         let narrow = header.replace('（', "(").replace('）', ")").replace('［', "[").replace('］', "]");
         let header = narrow.trim().trim_matches('"').trim();
+        // The columns of a matrix have no names of their own.
+        if is_of_matrix(header) {
+            return Self::default();
+        }
         if let Some(name) = Self::with_mark(header).or_else(|| Self::of_ratio(header)) {
             return name;
         }
@@ -165,6 +169,12 @@ impl Name {
     fn family(&self) -> Option<Family> {
         self.unit.map(|u| u.family)
     }
+}
+
+/// Whether a column is one of a matrix, as `X(:,1)`.
+pub(super) fn is_of_matrix(header: &str) -> bool {
+    let number = header.strip_suffix(')').and_then(|h| h.rsplit_once("(:,")).map(|(_, number)| number);
+    number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// What stands before a pair of brackets, in it, and behind it; the pair may contain others: `p (bar(a))`.

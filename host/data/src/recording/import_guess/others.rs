@@ -20,6 +20,10 @@ pub(super) struct Others<'a> {
 struct Seen {
     file: String,
     headers: Vec<String>,
+    /// The units of a row of their own below the names.
+    units: Option<Vec<String>>,
+    /// Whether lines begin with a number sign.
+    remarks: bool,
     /// Of each column of numbers.
     ranges: Vec<(String, Range)>,
 }
@@ -59,6 +63,8 @@ impl<'a> Others<'a> {
             Some(Seen {
                 file: file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
                 headers: sample.columns.iter().map(|c| c.header.clone()).collect(),
+                units: sample.layout.as_ref().and_then(|l| l.units.clone()),
+                remarks: sample.layout.as_ref().is_some_and(|l| l.remarks),
                 ranges: numeric.map(|c| (c.header.clone(), Range::of(c))).collect(),
             })
         };
@@ -71,9 +77,23 @@ impl<'a> Others<'a> {
         self.seen().iter().filter_map(one).collect()
     }
 
-    /// The first file whose columns have other names than these, or other places.
-    pub(super) fn with_other_columns(&self, headers: &[&str]) -> Option<&str> {
-        self.seen().iter().find(|file| file.headers != headers).map(|file| file.file.as_str())
+    /// The files in which one of these columns, by its index, has another name or another unit below its name than in the first.
+    pub(super) fn with_other_columns(&self, first: &Sample, columns: &[usize]) -> Vec<&str> {
+        let own = first.layout.as_ref().and_then(|l| l.units.as_ref());
+        let unit =
+            |units: Option<&Vec<String>>, n: usize| units.and_then(|u| u.get(n)).cloned().unwrap_or_default();
+        let differs = |file: &&Seen| {
+            columns.iter().any(|n| {
+                file.headers.get(*n) != first.columns.get(*n).map(|c| &c.header)
+                    || unit(file.units.as_ref(), *n) != unit(own, *n)
+            })
+        };
+        self.seen().iter().filter(differs).map(|file| file.file.as_str()).collect()
+    }
+
+    /// Whether one of them has lines that begin with a number sign.
+    pub(super) fn have_remarks(&self) -> bool {
+        self.seen().iter().any(|file| file.remarks)
     }
 
     /// Their names without folders.

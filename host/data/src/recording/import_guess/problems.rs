@@ -4,6 +4,7 @@ use super::others::Others;
 use super::runs;
 use super::sample::{Sample, SampleColumn};
 use super::{Guess, GuessedColumn, Note, Source, roles};
+use crate::error::{DataCode, Error, Result};
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
 
@@ -74,12 +75,12 @@ pub(super) fn incomplete_rows(sample: &Sample, guess: &mut Guess) {
     );
     if 2 * complete < sample.rows {
         guess.unknown.push(format!(
-            "{without}, and only {} a number in every column: where the channels were recorded at different times, interpolate them to \
+            "{without}, and {} a number in every column: where the channels were recorded at different times, interpolate them to \
              the times of one of them",
             match complete {
                 0 => "no row has".to_owned(),
-                1 => "one row has".to_owned(),
-                n => format!("{} have", pluralise(n, "row")),
+                1 => "only one row has".to_owned(),
+                n => format!("only {} have", pluralise(n, "row")),
             }
         ).into());
     } else {
@@ -125,15 +126,29 @@ pub(super) fn clock(time: &SampleColumn, at: usize, guess: &mut Guess) {
     guess.unknown.push(Note::on_column(&time.header, Some(Quantity::Time), text));
 }
 
-/// Files whose columns are in another order, where the description counts columns: nothing else would notice.
-pub(super) fn other_columns(sample: &Sample, others: &Others<'_>, guess: &mut Guess) {
-    if !guess.columns.iter().any(|c| matches!(c.source, Source::Number(_))) {
-        return;
+/// Refuses files whose columns have other places or other units in a row of their own, where the description counts columns: nothing else
+/// would notice.
+pub(super) fn other_columns(sample: &Sample, others: &Others<'_>, guess: &Guess) -> Result<()> {
+    /// Files that are named.
+    const NAMED: usize = 5;
+    let by_number = |c: &GuessedColumn| match c.source {
+        Source::Number(n) => Some(n - 1),
+        Source::Named(_) | Source::Listed(_) => None,
+    };
+    let columns: Vec<usize> = guess.columns.iter().filter_map(by_number).collect();
+    if columns.is_empty() {
+        return Ok(());
     }
-    let headers: Vec<&str> = sample.columns.iter().map(|c| c.header.as_str()).collect();
-    if let Some(file) = others.with_other_columns(&headers) {
-        guess.unknown.push(format!(
-            "the columns of {file} have other names or another order, and the description counts them: describe such files by themselves"
-        ).into());
+    let differing = others.with_other_columns(sample, &columns);
+    if differing.is_empty() {
+        return Ok(());
     }
+    let more = differing.len().saturating_sub(NAMED);
+    let mut names = differing.into_iter().take(NAMED).collect::<Vec<_>>().join(", ");
+    if more > 0 {
+        names += &format!(", and {more} more");
+    }
+    let cause = format!("the columns have other names, units, or places than in {}: {names}", guess.file);
+    Err(Error::new(DataCode::CallInvalid, cause)
+        .help("describe files of each form by themselves, in calls of their own"))
 }

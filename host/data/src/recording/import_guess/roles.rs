@@ -3,19 +3,25 @@
 use std::path::Path;
 
 use super::lookup;
-use super::names::{Family, Name, Score};
+use super::names::{Family, Name, Score, is_of_matrix};
 use super::others::Others;
 use super::sample::{Sample, SampleColumn};
+use super::text::quoted;
 use super::{
     Guess, GuessedColumn, Note, Source, absolute, constant_pressure, file_name_length, problems, runs,
     side_by_side, stroke, time, values,
 };
+use crate::error::Result;
 use crate::pluralise::pluralise;
 use crate::recording::Quantity;
+use crate::recording::time_of_day::DAY;
 use crate::short_number::short;
 
 /// Decides on every column.
-pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess {
+///
+/// # Errors
+/// Other files whose columns are not those of the first.
+pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Result<Guess> {
     let mut guess = Guess {
         file: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         rows: sample.rows,
@@ -29,7 +35,8 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     if let Some(layout) = &sample.layout {
         guess.delimiter = sample.sheet.is_none().then(|| layout.delimiter_name().to_owned());
         guess.decimal_comma = layout.decimal_comma;
-        guess.remarks = layout.remarks.then(|| char::from(layout.comment));
+        let remarks = layout.remarks || layout.comment == b'#' && others.have_remarks();
+        guess.remarks = remarks.then(|| char::from(layout.comment));
         guess.thousands = sample.thousands.map(char::from);
         guess.skip_lines =
             if sample.has_header { layout.names_at.unwrap_or(layout.data_at) } else { layout.data_at };
@@ -59,6 +66,8 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
         }
     }
     time::find(sample, &mut used, &mut guess);
+    time::describe_parts(sample, &mut used, &mut guess);
+    time::interval(sample, &mut guess);
     problems::texts(sample, &mut guess);
     constant_pressure::find(sample, others, &mut guess);
     find_runs(path, sample, &mut used, &mut guess);
@@ -69,14 +78,24 @@ pub(super) fn assign(path: &Path, sample: &Sample, others: &Others<'_>) -> Guess
     if !several {
         problems::incomplete_rows(sample, &mut guess);
     }
-    problems::other_columns(sample, others, &mut guess);
-    let rest = sample.columns.iter().zip(&used).filter(|(_, used)| !**used);
-    guess.unused = rest.map(|(c, _)| c.header.clone()).collect();
+    problems::other_columns(sample, others, &guess)?;
+    guess.unused = (0..used.len()).filter(|n| !used[*n]).filter_map(|n| called(sample, n)).collect();
     // Of recordings side by side that are not described nothing is.
     if !several || guess.side_by_side.is_some() {
         what_is_missing(sample, &mut guess);
     }
-    guess
+    Ok(guess)
+}
+
+/// What a column is called in messages; `None` for an empty one without a name.
+fn called(sample: &Sample, n: usize) -> Option<String> {
+    let column = &sample.columns[n];
+    let empty = column.missing == column.numbers.len();
+    match column.header.as_str() {
+        "" if empty => None,
+        "" => Some(format!("column {}", n + 1)),
+        header => Some(header.to_owned()),
+    }
 }
 
 /// Where a column is, for the description: by name where the reader finds that name once.
@@ -100,7 +119,8 @@ fn best(
 ) -> Option<usize> {
     let fits = |(n, c): (usize, &SampleColumn)| -> Option<(Score, usize)> {
         let (q, score) = c.name.quantity()?;
-        (q == quantity && c.is_numeric() && !used[n]).then_some((score, n))
+        let part = sample.joined.is_some_and(|j| j.fraction.is_some_and(|(part, _)| part == n));
+        (q == quantity && c.is_numeric() && !used[n] && !part).then_some((score, n))
     };
     let mut found: Vec<(Score, usize)> = sample.columns.iter().enumerate().filter_map(fits).collect();
     // A load cell that reads one value throughout is not connected.
@@ -109,13 +129,20 @@ fn best(
     let steady = |n: usize| quantity == Quantity::Pressure && is_steady(&sample.columns[n], others);
     found.sort_by_cached_key(|(score, n)| (dead(*n), -score, steady(*n), *n));
     let (score, first) = *found.first()?;
-    let competitors: Vec<&str> = found[1..]
-        .iter()
-        .filter(|(s, _)| *s == score)
-        .map(|(_, n)| sample.columns[*n].header.as_str())
-        .collect();
+    if quantity == Quantity::Time && time::is_unclear(sample, &found, guess) {
+        return None;
+    }
+    let competitors: Vec<usize> = found[1..].iter().filter(|(s, _)| *s == score).map(|(_, n)| *n).collect();
     if !competitors.is_empty() {
         let header = &sample.columns[first].header;
+        // Columns of one name differ in their numbers only.
+        let twice = competitors.iter().any(|n| sample.columns[*n].header == *header);
+        let name = |n: usize| {
+            let header = &sample.columns[n].header;
+            if twice { format!("column {} ({header})", n + 1) } else { header.clone() }
+        };
+        let header = name(first);
+        let competitors: Vec<String> = competitors.into_iter().map(name).collect();
         if quantity == Quantity::PressureCommand {
             let text = format!(
                 "commanded pressures are in {header}, {}: describe that of this muscle as columns.pressure_command",
@@ -205,6 +232,8 @@ fn described(
         extension: quantity == Quantity::Displacement && column.name.lengthens(),
         from_longest: false,
         values: Vec::new(),
+        date: None,
+        fraction: None,
         range: Some((low, high)),
     })
 }
@@ -252,13 +281,14 @@ fn unit_of(column: &SampleColumn, quantity: Quantity, others: &Others<'_>) -> Re
         ));
     };
     let (unit, scale) = (suggested.unit, suggested.scale);
+    let offset = if scale == DAY { values::epoch_of_days(column) } else { 0.0 };
     let others = if suggested.others.is_empty() {
         String::new()
     } else {
         format!(" (or {})", suggested.others.join(", "))
     };
-    let check = format!("{header} has no unit; its values look like {unit}{others}");
-    Ok(GuessedUnit { unit, scale, check: Some(check), ..plain })
+    let check = format!("{header} has no unit; its values look like {}{others}", suggested.spelled());
+    Ok(GuessedUnit { unit, scale, offset, check: Some(check) })
 }
 
 /// The largest number of a column in all files, of either sign.
@@ -283,6 +313,8 @@ fn find_runs(path: &Path, sample: &Sample, used: &mut [bool], guess: &mut Guess)
                 extension: false,
                 from_longest: false,
                 values,
+                date: None,
+                fraction: None,
                 range: None,
             });
         }
@@ -340,6 +372,8 @@ fn from_list(quantity: Quantity, header: &str, name: &Name) -> GuessedColumn {
         extension: quantity == Quantity::Displacement && name.lengthens(),
         from_longest: false,
         values: Vec::new(),
+        date: None,
+        fraction: None,
         range: None,
     }
 }
@@ -383,9 +417,19 @@ fn list(words: &[String]) -> String {
 
 /// What a recording needs and the file does not say.
 fn what_is_missing(sample: &Sample, guess: &mut Guess) {
+    if !guess.has(Quantity::Force)
+        && let Some(column) = sample.columns.iter().find(|c| is_of_matrix(&c.header))
+    {
+        let text = format!(
+            "the columns of a matrix have no names: write which is what, such as column = {} and unit = \"s\" under [columns.time]",
+            quoted(&column.header)
+        );
+        guess.unknown.push(text.into());
+        return;
+    }
     let is_noted =
         |guess: &Guess, quantity: Quantity| guess.unknown.iter().any(|note| note.is_on_quantity(quantity));
-    if !guess.has(Quantity::Time) && !is_noted(guess, Quantity::Time) {
+    if !guess.has(Quantity::Time) && guess.sample_interval_s.is_none() && !is_noted(guess, Quantity::Time) {
         let text = "no column of time: where the rows are equally spaced, write sample_interval_s = SECONDS";
         guess.unknown.insert(0, text.into());
     }

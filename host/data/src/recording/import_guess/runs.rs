@@ -18,7 +18,9 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
         return (Vec::new(), restarts.iter().filter(|r| **r).count());
     }
     let labels = |c: &SampleColumn| -> Option<bool> {
-        let long = |l: &&Levels| l.words.len() > 1 && LEAST_ROWS * l.words.len() <= l.codes.len();
+        // A note beside the table leaves most cells of its column empty.
+        let noted = c.header.is_empty() || 2 * c.missing > c.numbers.len();
+        let long = |l: &&Levels| l.words.len() > 1 && LEAST_ROWS * l.words.len() <= l.codes.len() && !noted;
         let levels = c.levels.as_ref().filter(long)?;
         // A label changes only where a run begins; what changes within a run is a measurement or a direction.
         let at_starts = levels.codes.windows(2).zip(&restarts[1..]).all(|(w, start)| w[0] == w[1] || *start);
@@ -27,7 +29,8 @@ pub(super) fn splits(columns: &[SampleColumn], time: usize) -> (Vec<usize>, usiz
     let mut candidates: Vec<(bool, usize)> = columns
         .iter()
         .enumerate()
-        .filter(|(n, _)| *n != clock)
+        // A time of day is no label of a run, although a coarse one changes only where the parts of its second begin again.
+        .filter(|(n, c)| *n != clock && !c.is_stamped())
         .filter_map(|(n, c)| Some((labels(c)?, n)))
         .collect();
     // Columns that are called run or condition before those of lengths and other settings.

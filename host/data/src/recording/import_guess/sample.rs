@@ -6,16 +6,18 @@ use std::path::Path;
 
 use super::Note;
 use super::forms::{self, Forms};
+use super::joined_time::{self, Joined};
 use super::layout::{Layout, cells, is_missing};
 use super::names::Name;
-use crate::date::{DateOrder, time_stamp_in};
+use crate::date::{DateOrder, date_in, time_stamp_in};
 use crate::error::{DataCode, Error, Result};
 use crate::recording::Quantity;
 use crate::recording::column_table::Column as Stored;
 use crate::recording::container::{self, Container};
 use crate::recording::header::mac_lines;
-use crate::recording::line::decode;
+use crate::recording::line::{decode, is_remark};
 use crate::recording::mcap::Needed;
+use crate::recording::read::unpacked;
 use crate::recording::source;
 use crate::recording::time_of_day;
 #[cfg(feature = "excel")]
@@ -37,7 +39,7 @@ pub(super) struct SampleColumn {
     /// As the file has it; a number where it has none.
     pub header: String,
     pub name: Name,
-    /// Numbers, of time stamps their seconds; NaN where a cell holds none.
+    /// Numbers, of time stamps and dates their seconds; NaN where a cell holds none.
     pub numbers: Vec<f64>,
     /// Cells that are empty or not finite.
     pub missing: usize,
@@ -49,6 +51,8 @@ pub(super) struct SampleColumn {
     pub midnight: Option<usize>,
     /// How many of these are dates with a time of day, or times of day.
     pub stamps: usize,
+    /// How many of these are dates alone.
+    pub dates: usize,
     /// The different cells, where there are few, and which of them each row has.
     pub levels: Option<Levels>,
 }
@@ -87,16 +91,18 @@ impl SampleColumn {
         let cell = cell.trim();
         let value = forms.number(cell);
         let stamp = if value.is_none() { time_stamp_in(cell, forms.order) } else { None };
+        let date = if value.is_none() { date_in(cell, forms.order) } else { None };
         match value {
             None if is_missing(cell) => self.missing += 1,
             None => {
                 self.texts += 1;
                 self.first_text.get_or_insert_with(|| cell.to_owned());
                 self.stamps += usize::from(stamp.is_some());
+                self.dates += usize::from(date.is_some());
             }
             Some(_) => {}
         }
-        self.numbers.push(value.or(stamp).unwrap_or(f64::NAN));
+        self.numbers.push(value.or(stamp).or(date).unwrap_or(f64::NAN));
         if self.levels.as_mut().is_some_and(|l| !l.push(cell)) {
             self.levels = None;
         }
@@ -114,7 +120,16 @@ impl SampleColumn {
 
     /// Whether it holds dates with a time of day, or times of day.
     pub(super) fn is_stamped(&self) -> bool {
-        self.texts > 0 && self.texts == self.stamps && self.texts + self.missing == self.numbers.len()
+        self.holds_only(self.stamps) && !self.is_dated()
+    }
+
+    /// Whether it holds dates alone, which a spreadsheet writes with the midnight behind them.
+    pub(super) fn is_dated(&self) -> bool {
+        self.holds_only(self.dates)
+    }
+
+    fn holds_only(&self, of_these: usize) -> bool {
+        self.texts > 0 && self.texts == of_these && self.texts + self.missing == self.numbers.len()
     }
 
     /// Its finite numbers.
@@ -152,6 +167,8 @@ pub(super) struct Sample {
     pub whole: bool,
     /// How dates with slashes are read.
     pub order: DateOrder,
+    /// The columns of a time that is in several.
+    pub joined: Option<Joined>,
     /// What separates thousands.
     pub thousands: Option<u8>,
     /// How the columns of a container were made, and what was found about the form of a text.
@@ -162,6 +179,12 @@ pub(super) struct Sample {
 
 impl Sample {
     pub(super) fn read(path: &Path, sheet: Option<&str>) -> Result<Self> {
+        let mut sample = Self::of_file(path, sheet)?;
+        joined_time::join(&mut sample);
+        Ok(sample)
+    }
+
+    fn of_file(path: &Path, sheet: Option<&str>) -> Result<Self> {
         #[cfg(not(feature = "excel"))]
         let _ = sheet;
         let mut source = source::open(path, None, false)?;
@@ -184,7 +207,7 @@ impl Sample {
             None => {
                 let mut text = Vec::new();
                 let read = source.reader.take(LOOKED_AT).read_to_end(&mut text);
-                read.map_err(|e| Error::unreadable(path, &e))?;
+                read.map_err(unpacked)?;
                 Self::of_text(&text)
             }
         }
@@ -209,7 +232,8 @@ impl Sample {
             ));
         };
         layout.comment = forms::sign_of_remarks(&lines, &layout);
-        layout.remarks |= layout.comment != b'#';
+        let remark = |line: &&[u8]| is_remark(line, Some(layout.comment));
+        layout.remarks |= lines[layout.data_at..].iter().any(remark);
         let lossy = |l: &&[u8]| decode(l).trim_end().to_owned();
         let names_at = layout.names_at.unwrap_or(layout.data_at);
         let mut sample = Self {

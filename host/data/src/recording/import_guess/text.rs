@@ -86,6 +86,9 @@ fn file_form(guess: &Guess) -> String {
     if guess.skip_missing {
         out += "missing = \"skip\"\n";
     }
+    if let Some(interval) = guess.sample_interval_s {
+        let _ = writeln!(out, "sample_interval_s = {}", number(interval));
+    }
     for GuessedPattern { text, expression, .. } in &guess.patterns {
         let _ = writeln!(out, "{text} = {}", literal(expression));
     }
@@ -101,10 +104,11 @@ fn file_form(guess: &Guess) -> String {
 
 /// The table of one quantity.
 fn column_table(column: &GuessedColumn) -> String {
-    let reference = match &column.source {
+    let of = |source: &Source| match source {
         Source::Number(n) => n.to_string(),
         Source::Named(name) | Source::Listed(name) => quoted(name),
     };
+    let reference = of(&column.source);
     let note = if matches!(column.source, Source::Number(_)) && column.header.parse::<usize>().is_err() {
         format!("          # {}", column.header)
     } else {
@@ -113,6 +117,12 @@ fn column_table(column: &GuessedColumn) -> String {
     let mut out = format!("\n[columns.{}]\ncolumn = {reference}{note}\n", column.quantity.name());
     if !column.unit.is_empty() {
         let _ = writeln!(out, "unit = {}", quoted(column.unit));
+    }
+    if let Some(date) = &column.date {
+        let _ = writeln!(out, "date = {}", of(date));
+    }
+    if let Some((fraction, unit)) = &column.fraction {
+        let _ = writeln!(out, "fraction = {{ column = {}, unit = {} }}", of(fraction), quoted(unit));
     }
     if column.scale != 1.0 {
         let _ = writeln!(out, "scale = {}", number(column.scale));

@@ -3,6 +3,7 @@
 use super::others::Range;
 use super::sample::SampleColumn;
 use crate::recording::Quantity;
+use crate::recording::time_of_day::DAY;
 use crate::short_number::short;
 use crate::statistics::extremes;
 use crate::statistics::median;
@@ -22,6 +23,18 @@ pub(super) struct Suggested {
     pub unit: &'static str,
     pub scale: f64,
     pub others: Vec<&'static str>,
+}
+
+impl Suggested {
+    /// The unit with its scale, as it is spelled.
+    pub(super) fn spelled(&self) -> &'static str {
+        match self.scale {
+            1e-3 if self.unit == "ms" => "µs",
+            1e-6 if self.unit == "ms" => "ns",
+            DAY => "days",
+            _ => self.unit,
+        }
+    }
 }
 
 /// The units for which a value lies within bounds in SI: (name of the unit, further scale, factor to SI).
@@ -53,12 +66,23 @@ pub(super) fn suggested(quantity: Quantity, column: &SampleColumn, others: &[Ran
             allowed(size, STROKES, &[("mm", 1.0, 1e-3), ("m", 1.0, 1.0), ("in", 1.0, 0.0254)])
         }
         Quantity::Time => {
-            allowed(interval(column)?, INTERVALS, &[("s", 1.0, 1.0), ("ms", 1.0, 1e-3), ("ms", 1e-3, 1e-6)])
+            let units =
+                [("s", 1.0, 1.0), ("ms", 1.0, 1e-3), ("ms", 1e-3, 1e-6), ("ms", 1e-6, 1e-9), ("s", DAY, DAY)];
+            allowed(interval(column)?, INTERVALS, &units)
         }
         Quantity::Force => Some(Suggested { unit: "N", scale: 1.0, others: vec!["kg", "lbf"] }),
         Quantity::Temperature => Some(Suggested { unit: "C", scale: 1.0, others: vec![] }),
         _ => Some(Suggested { unit: "", scale: 1.0, others: vec![] }),
     }
+}
+
+/// What is added to times in days, s, so that they count from 1970: a spreadsheet counts them from the end of 1899, MATLAB from year 0.
+pub(super) fn epoch_of_days(column: &SampleColumn) -> f64 {
+    /// Days of the years from 1982 to 2063, and what they are for 1970-01-01.
+    const COUNTS: [((f64, f64), f64); 2] = [((30e3, 60e3), 25_569.0), ((724e3, 754e3), 719_529.0)];
+    let (low, high) = column.range();
+    let counted = COUNTS.iter().find(|((from, to), _)| low >= *from && high <= *to);
+    counted.map_or(0.0, |(_, days)| -days * DAY)
 }
 
 /// Whether all numbers are the same.
@@ -169,6 +193,9 @@ mod tests {
         };
         assert_eq!((at(0.01).unit, at(10.0).unit), ("s", "ms"));
         assert_eq!((at(1000.0).unit, at(1000.0).scale), ("ms", 1e-3));
+        // Nanoseconds since 1970.
+        let epoch = suggested(Quantity::Time, &column((0..20).map(|i| 1.7e18 + 3.3e7 * f64::from(i))), &[]);
+        assert_eq!(epoch.map(|s| (s.spelled(), s.scale)), Some(("ns", 1e-6)));
         // 120 may be kPa or psi, and is reported so.
         assert_eq!(
             suggested(Quantity::Pressure, &column([0.0, 120.0]), &[]).map(|s| s.others),

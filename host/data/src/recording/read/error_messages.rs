@@ -14,13 +14,20 @@ pub(super) fn block_error(error: BlockError) -> Error {
             Error::new(DataCode::RecordingNotText, "the file has a line of more than 4 MiB")
                 .help("this is not a table of text: give a CSV or tab-separated file with one header line")
         }
-        BlockError::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Error::unreadable("", &e),
-        BlockError::Io(e) if matches!(e.kind(), std::io::ErrorKind::PermissionDenied) => {
-            Error::new(DataCode::FileUnreadable, format!("cannot be read: {e}"))
+        BlockError::Io(e) => unpacked(e),
+    }
+}
+
+/// The error of a file that is open and cannot be read, or unpacked, to its end.
+pub(in crate::recording) fn unpacked(error: std::io::Error) -> Error {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => Error::unreadable("", &error),
+        std::io::ErrorKind::PermissionDenied => {
+            Error::new(DataCode::FileUnreadable, format!("cannot be read: {error}"))
         }
-        BlockError::Io(e) => {
+        _ => {
             // What follows a colon is the unpacker's own, written for its authors.
-            let reason = e.to_string();
+            let reason = error.to_string();
             let reason = reason.split(':').next().unwrap_or_default();
             Error::new(DataCode::RecordingContainer, format!("cannot be read to its end: {reason}"))
                 .help("the file may be damaged or incomplete: copy it again")
@@ -74,6 +81,8 @@ pub(super) fn rows_error(error: RowsError, header: &Header, import: &Import) -> 
         Fault::NotAStamp => Error::new(DataCode::RecordingNotANumber, "not a time stamp").help(
             "time stamps are like 2026-11-21T13:30:00.25, 21.11.2026 13:30:00, or 13:30:00.25; a month before the day is ambiguous",
         ),
+        Fault::NotADate => Error::new(DataCode::RecordingNotANumber, "not a date")
+            .help("dates are like 2026-11-21 or 21.11.2026; a month before the day needs unit = \"timestamp-month-first\""),
         Fault::Width { found, expected } => {
             let cells = pluralise(found, "cell");
             let help = if *found == 2 * expected && separator == "commas" {

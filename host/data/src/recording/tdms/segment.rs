@@ -67,7 +67,7 @@ impl File {
         }
     }
 
-    /// Reads all segments. What follows the last whole one, as after a crash, is read as far as it goes.
+    /// Reads all segments. One whose length was left open, as after a crash, is read as far as it goes.
     pub(super) fn read(&mut self, mut file: &[u8]) -> Result<()> {
         while !file.is_empty() {
             let mut lead = Bytes { rest: file, big: false };
@@ -81,7 +81,14 @@ impl File {
             lead.big = has & contents::BIG_ENDIAN != 0;
             let (_version, next, raw_at) = (lead.u32()?, lead.u64()?, lead.u64()?);
             let rest = lead.rest.len() as u64;
-            let length = if next == OPEN { rest } else { next.min(rest) };
+            // A program that was interrupted leaves the length open; a copy that was cut off is shorter than it says.
+            if next != OPEN && next > rest {
+                let cause = format!("the TDMS file ends {} bytes before its last segment does", next - rest);
+                return Err(
+                    Error::new(DataCode::RecordingContainer, cause).help("it is incomplete: copy it again")
+                );
+            }
+            let length = next.min(rest);
             if raw_at > length {
                 return Err(damaged("the place of the raw data in a segment leads out of it"));
             }

@@ -53,6 +53,15 @@ fn chunks_repeat_and_a_list_stays_in_force() {
 }
 
 #[test]
+fn a_file_that_is_cut_off_is_refused() {
+    let mut file = segment(2, false, &[1, 2, 3, 4]);
+    file.extend(lead_in(0b1000, &[], &[5, 6, 7]));
+    file.truncate(file.len() - 2);
+    let error = columns(&file, Budget::whole()).unwrap_err();
+    assert!(error.cause().contains("2 bytes before"), "{error}");
+}
+
+#[test]
 fn announced_values_take_no_memory_and_those_there_are_counted() {
     assert_eq!(numbers(&segment(u64::MAX, false, &[9; 100]), Budget::whole()).len(), 100);
     // The name takes as much as 53 values, and a file's values what they are.

@@ -40,6 +40,27 @@ fn lines_above_the_table_and_other_names_are_guessed() {
 }
 
 #[test]
+fn numbers_that_a_sheet_holds_as_text_and_notes_beside_its_table_are_described() {
+    let guessed = guess(&fixture("text_numbers.xlsx"), None).unwrap();
+    assert!(
+        guessed.split_by.is_empty() && guessed.description.contains("decimal = \"comma\""),
+        "{guessed:?}"
+    );
+    assert_eq!(guessed.unused, ["column 6", "column 8"]);
+    let import = Import::parse(&guessed.description).unwrap();
+    assert_the_rows_of_the_text(
+        "text",
+        Reader::new().import(Some(&import)).file(&fixture("text_numbers.xlsx")),
+    );
+    // A description of text files with decimal commas reads the numbers of a sheet.
+    let import = Import::parse("decimal = \"comma\"\n").unwrap();
+    assert_the_rows_of_the_text(
+        "numbers",
+        Reader::new().import(Some(&import)).file(&fixture("recording.xlsx")),
+    );
+}
+
+#[test]
 fn workbooks_that_are_not_recordings_are_reported_with_the_remedy() {
     let message = |name: &str, reader: &Reader<'_>| {
         let error = reader.file(&fixture(name)).expect_err(name);
