@@ -24,6 +24,7 @@ use std::ops::Range;
 
 use super::dropouts::ExpectedForce;
 use super::places::{listed, rows_and_times};
+use super::spikes::{self, without_spikes};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
 use crate::statistics::{median, quantile};
@@ -114,7 +115,7 @@ struct Usual {
     expected: ExpectedForce,
     /// Median size of the residual of a recording, N, taken at the median recording.
     residual: f64,
-    /// Ranges of pressure, stroke and force without the few farthest values, SI.
+    /// Ranges of pressure, stroke and force without spikes and the few farthest values, SI.
     spans: [f64; 3],
     /// The largest usual pressure, Pa.
     top_pressure: f64,
@@ -127,10 +128,10 @@ impl Usual {
         let expected = ExpectedForce::of(campaign, &masks)?;
         let taken = || campaign.recordings.iter().zip(skipped).filter(|(_, skip)| !**skip).map(|(r, _)| r);
         let spans = Channel::ALL.map(|c| {
-            let mut some: Vec<f64> = taken().flat_map(|r| thinned(c.of(r))).collect();
+            let mut some: Vec<f64> = taken().flat_map(|r| without_spikes(c.of(r), stride(r.len()))).collect();
             quantile(&mut some, 0.998) - quantile(&mut some, 0.002)
         });
-        let mut tops: Vec<f64> = taken().flat_map(|r| thinned(&r.pressure)).collect();
+        let mut tops: Vec<f64> = taken().flat_map(|r| without_spikes(&r.pressure, stride(r.len()))).collect();
         let top_pressure = quantile(&mut tops, 0.99);
         let mut residuals: Vec<f64> = taken()
             .filter(|r| r.force.is_some() && !r.is_empty())
@@ -204,9 +205,14 @@ pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<Sensor
 }
 
 impl SensorFault {
-    /// Whether its readings are replaced. Force stays as it was read: no motion is derived from it.
+    /// Whether its readings are replaced. A force stays as it was read, as no motion is derived from it, unless it is that of a spike: its
+    /// range is.
     pub(super) fn has_bridge(&self) -> bool {
-        self.channel != Channel::Force && self.kind != Kind::Dead
+        match self.kind {
+            Kind::Dead => false,
+            Kind::DropOut if self.rows.len() < spikes::LONGEST => true,
+            Kind::Frozen | Kind::Saturated | Kind::DropOut => self.channel != Channel::Force,
+        }
     }
 
     /// Replaces the failed readings by the line between those beside, good enough to follow the motion.
