@@ -10,11 +10,13 @@
 //! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | `constant_runs` |
 //! | dead | one value through a recording | a force that this value excludes | `dead_channels` |
 //! | drop-out | a step away, and back | no other reading steps | `jumps` |
+//! | missed readings | one value in single rows | proved in many other rows | `glitches` |
 //!
 //! Drop-outs of the pressure are those of [`super::dropouts`].
 
 mod constant_runs;
 mod dead_channels;
+mod glitches;
 mod jumps;
 mod stroke_motion;
 #[cfg(test)]
@@ -22,12 +24,14 @@ mod tests;
 
 use std::ops::Range;
 
-use super::dropouts::ExpectedForce;
+use super::dropouts::{Dropout, ExpectedForce};
 use super::places::{listed, rows_and_times};
 use super::spikes::{self, without_spikes};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
 use crate::statistics::{median, quantile};
+
+pub(super) use glitches::of_all_channels;
 
 /// A column that a sensor reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -93,6 +97,8 @@ pub enum Kind {
     Dead,
     /// It steps away and back.
     DropOut,
+    /// All sensors step away and back together: the logger missed a row.
+    Missed,
 }
 
 /// Rows of a recording in which a sensor failed.
@@ -174,8 +180,8 @@ fn thinned(column: &[f64]) -> impl Iterator<Item = f64> + '_ {
 }
 
 /// The failures of sensors in a campaign, in the order of recordings and rows. Recordings that are `skipped` (another unit, sign or zero
-/// than the others) are neither judged nor used as reference.
-pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<SensorFault> {
+/// than the others) are neither judged nor used as reference. `dropouts` are those that were found, and bridged, before.
+pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool], dropouts: &[Dropout]) -> Vec<SensorFault> {
     // A dead recording bends the surface; it is found first, and the rest is judged without it.
     let Some(usual) = Usual::of(campaign, skipped) else { return Vec::new() };
     let mut faults = dead_channels::find(campaign, skipped, &usual);
@@ -200,6 +206,7 @@ pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<Sensor
         found.sort_by_key(|f| f.rows.start);
         faults.extend(found);
     }
+    faults.extend(glitches::of_known_values(campaign, &skipped, &faults, dropouts));
     faults.sort_by_key(|f| (f.recording, f.rows.start));
     faults
 }
@@ -210,6 +217,7 @@ impl SensorFault {
     pub(super) fn has_bridge(&self) -> bool {
         match self.kind {
             Kind::Dead => false,
+            Kind::Missed => true,
             Kind::DropOut if self.rows.len() < spikes::LONGEST => true,
             Kind::Frozen | Kind::Saturated | Kind::DropOut => self.channel != Channel::Force,
         }
@@ -240,6 +248,16 @@ impl SensorFault {
 
 /// One sentence for each sensor and kind of failure: places, rows and the remedy.
 pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<String> {
+    let missed: Vec<&SensorFault> =
+        faults.iter().filter(|f| f.kind == Kind::Missed && f.channel == Channel::Pressure).collect();
+    let rows: usize = missed.iter().map(|f| f.rows.len()).sum();
+    let missed = (!missed.is_empty()).then(|| {
+        format!(
+            "failed logger: pressure, stroke and force step away and back together within one row each; {} excluded: {}; check the logger",
+            pluralise(rows, "row"),
+            listed(missed.iter().map(|f| f.place(campaign)))
+        )
+    });
     let kinds = [Kind::Dead, Kind::Frozen, Kind::Saturated, Kind::DropOut];
     let pairs = Channel::ALL.into_iter().flat_map(|c| kinds.into_iter().map(move |k| (c, k)));
     let sentence = |(channel, kind): (Channel, Kind)| {
@@ -258,7 +276,9 @@ pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<Strin
             Kind::Saturated => {
                 ("stops at the end of its range", "use a sensor or an amplifier of a larger range")
             }
-            Kind::DropOut => ("steps away and back within one row each", "check connector and cable"),
+            Kind::DropOut | Kind::Missed => {
+                ("steps away and back within one row each", "check connector and cable")
+            }
         };
         let name = channel.name();
         let rows: usize = of.iter().map(|f| f.rows.len()).sum();
@@ -268,5 +288,5 @@ pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<Strin
             listed(of.iter().map(|f| f.place(campaign)))
         ))
     };
-    pairs.filter_map(sentence).collect()
+    missed.into_iter().chain(pairs.filter_map(sentence)).collect()
 }

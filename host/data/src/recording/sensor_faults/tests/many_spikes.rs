@@ -1,4 +1,4 @@
-//! Spikes in several per cent of the rows of all files.
+//! Spikes in several per cent of the rows of all files, and values that a logger writes for readings that it missed.
 
 use super::*;
 
@@ -91,4 +91,47 @@ fn spikes_close_together_take_no_good_rows() {
             "{channel:?} {value}: {right} of {all}, {wrong} others"
         );
     }
+}
+
+/// Zeros are drop-outs near the beginning of a stroke, too, where they step less than a spike does, and where no force contradicts them.
+#[test]
+fn zeros_that_are_proved_in_dozens_of_rows_are_taken_in_the_others() {
+    for channel in Channel::ALL {
+        let clean = campaign(9);
+        let campaign = spoiled_rows(9, &[channel], 50, |_| 0.0);
+        // Less than that a fit does not notice.
+        let share = if channel == Channel::Stroke { 0.03e-3 } else { 0.0 };
+        let out = |r: &Recording| single(50).filter(|i| channel.of(r)[*i] > share).count();
+        let lost: usize = clean.recordings.iter().map(out).sum();
+        let (right, wrong) = excluded(&campaign, 50);
+        assert!(right >= lost && wrong == 0, "{channel:?}: {right} of {lost}, {wrong} others");
+    }
+}
+
+/// A row of zeros is that of a vented muscle at rest, which no force contradicts.
+#[test]
+fn rows_in_which_all_sensors_step_away_are_missed_rows() {
+    for (every, value) in [(333, 0.0), (50, 0.0), (333, -1.0)] {
+        let value = |v: f64| if value < 0.0 { -1e-3 + 0.0 * v } else { 0.0 };
+        let campaign = spoiled_rows(10, &Channel::ALL, every, value);
+        let rows = 6 * single(every).count();
+        let (right, wrong) = excluded(&campaign, every);
+        assert!(right == rows && wrong == 0, "1/{every}: {right} of {rows}, {wrong} others");
+        let remark = Screened::of(&campaign).remark().unwrap_or_default();
+        assert!(remark.contains("failed logger"), "{remark}");
+    }
+}
+
+/// A muscle that is vented for a row, and pulls less; noise tells its readings from those of a logger.
+#[test]
+fn a_vented_muscle_is_no_missed_row() {
+    let mut campaign = campaign(11);
+    for (file, r) in campaign.recordings.iter_mut().enumerate() {
+        let force = r.force.as_mut().unwrap();
+        for (k, i) in single(100).enumerate() {
+            let noise = |of: usize| 1.0 + ((16 * file + k) * of % 101) as f64 / 10.0;
+            (r.pressure[i], r.stroke[i], force[i]) = (50.0 * noise(41), 1e-6 * noise(59), 0.05 * noise(83));
+        }
+    }
+    assert!(!Screened::of(&campaign).faults.iter().any(|f| f.kind == Kind::Missed));
 }
