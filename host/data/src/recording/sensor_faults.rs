@@ -8,12 +8,14 @@
 //! | fault | reading | contradiction | file |
 //! | --- | --- | --- | --- |
 //! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | `constant_runs` |
+//! | saturated stroke | one value at an end, reached at speed | the force goes on, and comes back | `clipped_stroke` |
 //! | dead | one value through a recording | a force that this value excludes | `dead_channels` |
 //! | drop-out | a step away, and back | no other reading steps | `jumps` |
 //! | missed readings | one value in single rows | proved in many other rows | `glitches` |
 //!
 //! Drop-outs of the pressure are those of [`super::dropouts`].
 
+mod clipped_stroke;
 mod constant_runs;
 mod dead_channels;
 mod glitches;
@@ -191,15 +193,21 @@ pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool], dropouts: &[D
     }
     let usual = if faults.is_empty() { Some(usual) } else { Usual::of(campaign, &skipped) };
     let Some(usual) = usual else { return faults };
+    let clipped = clipped_stroke::find(campaign, &skipped, &usual);
     let repeats = constant_runs::Repeats::of(campaign);
     for (index, r) in campaign.recordings.iter().enumerate().filter(|(i, _)| !skipped[*i]) {
         if r.force.is_none() {
             continue;
         }
-        let mut found = constant_runs::find(campaign, index, &usual, &repeats);
+        let overlap = |f: &SensorFault, with: &SensorFault| {
+            f.rows.start < with.rows.end && with.rows.start < f.rows.end
+        };
+        let mut found: Vec<SensorFault> = clipped.iter().filter(|f| f.recording == index).cloned().collect();
+        let mut constant = constant_runs::find(campaign, index, &usual, &repeats);
+        constant.retain(|fault| !found.iter().any(|f| f.channel == fault.channel && overlap(f, fault)));
+        found.extend(constant);
         for fault in jumps::find(campaign, index, &usual) {
-            let overlaps = |f: &SensorFault| f.rows.start < fault.rows.end && fault.rows.start < f.rows.end;
-            if !found.iter().any(overlaps) {
+            if !found.iter().any(|f| overlap(f, &fault)) {
                 found.push(fault);
             }
         }

@@ -135,3 +135,37 @@ fn a_vented_muscle_is_no_missed_row() {
     }
     assert!(!Screened::of(&campaign).faults.iter().any(|f| f.kind == Kind::Missed));
 }
+
+/// The stroke of the bench ends at 2.5 mm for its sensor; or an axis holds it there, and the force creeps back.
+#[test]
+fn a_stroke_that_is_cut_in_all_files_is_found_and_a_hold_is_not() {
+    let end = 2.5e-3;
+    for seed in 12..16 {
+        let mut cut = campaign(seed);
+        let mut rows = 0;
+        for r in &mut cut.recordings {
+            rows += r.stroke.iter().filter(|x| **x >= end).count();
+            r.stroke.iter_mut().for_each(|x| *x = x.min(end));
+        }
+        let found = faults(&cut);
+        let saturated = |f: &&SensorFault| (f.channel, f.kind) == (Channel::Stroke, Kind::Saturated);
+        let of: usize = found.iter().filter(saturated).map(|f| f.rows.len()).sum();
+        assert_eq!((of, found.iter().filter(|f| !saturated(f)).count()), (rows, 0), "seed {seed}");
+
+        let mut held = cut;
+        for r in &mut held.recordings {
+            let Recording { stroke, force: Some(force), .. } = r else { continue };
+            let (mut since, mut first) = (0, 0.0);
+            for i in 0..force.len() {
+                if stroke[i] < end {
+                    (since, first) = (0, force[i]);
+                } else {
+                    since += 1;
+                    let creep = 0.03 * first * (1.0 - (-f64::from(since) / 10.0).exp());
+                    force[i] = ((first + creep) / 0.05).round() * 0.05 + 0.05 * f64::from(since * 7 % 5 - 2);
+                }
+            }
+        }
+        assert_eq!(faults(&held), [], "seed {seed}");
+    }
+}
