@@ -60,7 +60,7 @@ impl<'a> Screened<'a> {
     /// Screens a campaign. Recordings without a force are skipped: a drop-out and a real step look the same there.
     #[must_use]
     pub fn of(campaign: &'a Campaign) -> Self {
-        // Before a correction: a value that stands for a missed row is in no unit.
+        // Before a correction: the value of a missed row is in no unit.
         let missed = of_all_channels(campaign);
         let mut campaign = Cow::Borrowed(campaign);
         for fault in &missed {

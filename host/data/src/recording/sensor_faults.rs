@@ -8,7 +8,7 @@
 //! | fault | reading | contradiction | file |
 //! | --- | --- | --- | --- |
 //! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | `constant_runs` |
-//! | saturated stroke | one value at an end, reached at speed | the force goes on, and comes back | `clipped_stroke` |
+//! | saturated stroke | one value at an end, reached at speed | the force continues, and comes back | `clipped_stroke` |
 //! | dead | one value through a recording | a force that this value excludes | `dead_channels` |
 //! | drop-out | a step away, and back | no other reading steps | `jumps` |
 //! | missed readings | one value in single rows | proved in many other rows | `glitches` |

@@ -13,7 +13,7 @@ pub(super) const BACK: f64 = 0.25;
 pub(super) const SUDDEN: f64 = 2.0;
 /// This many changes on either side of a spike count. Where a fast stroke turns, it steps no farther than in the rows beside.
 const BESIDE: usize = 4;
-/// Of them so many tell how far the readings usually change.
+/// The least number of them that shows how far the readings usually change.
 const FEWEST: usize = 3;
 
 /// The row that ends a spike which begins at `start`; `step` is the least change from row to row.
@@ -63,8 +63,8 @@ pub(super) fn change_beside(column: &[f64], rows: Range<usize>) -> f64 {
 /// A spike leaves the readings beside it by this many standard deviations of a reading: of a normal distribution next to nothing does.
 pub(super) const ABOVE_NOISE: f64 = 12.0;
 
-/// Every so many rows, the reading of a column, unless it belongs to a spike of any size: the readings that tell the usual range. A quantile
-/// of all readings is that of the spikes where their share exceeds its rank.
+/// The reading of a column in every `stride`th row, unless it belongs to a spike of any size: the readings that show the usual range. A
+/// quantile of all readings is that of the spikes where their share exceeds its rank.
 pub(super) fn without_spikes(column: &[f64], stride: usize) -> impl Iterator<Item = f64> + '_ {
     let mut spikes = spikes(column, ABOVE_NOISE * white_noise(column)).into_iter().peekable();
     let mut reading = move |i: usize| {

@@ -1,7 +1,7 @@
-//! A displacement sensor, or its amplifier, whose range ends within the stroke: the reading stays at one value while the muscle goes on.
+//! A displacement sensor, or its amplifier, whose range ends within the stroke: the reading stays at one value while the muscle continues.
 //!
 //! The same happens where a muscle rests at a stop or an axis holds the end of a stroke. Then the force keeps still, or creeps back. Beyond
-//! the end of a sensor's range the force goes on as the motion does: on the way there, by as much as the speed before makes it, and back
+//! the end of a sensor's range the force continues as the motion does: on the way out, by as much as the speed before makes it, and back
 //! before the reading moves again. No hold anticipates its end.
 
 use std::collections::HashMap;
@@ -16,12 +16,12 @@ use crate::statistics::{extremes, quantile, slope};
 const SHORTEST: usize = 10;
 /// As many stays at one value show it: one of them may be a disturbance of the force while the length was held.
 const STAYS: usize = 2;
-/// The muscle goes on by this share of the range of strokes, as for a saturated force; and by this many steps of the converter: within a
+/// The muscle continues by this share of the range of strokes, as for a saturated force; and by this many steps of the converter: within a
 /// step any reading stays.
 const BEYOND: (f64, f64) = (0.03, 4.0);
-/// How far it goes on as a share of what the speed before allows until the middle of the stay: all of it where the stroke is a triangle over
-/// time, half where it is a sine. Creep of a held muscle makes less.
-const GOES_ON: (f64, f64) = (0.2, 2.0);
+/// How far it continues as a share of what the speed before allows until the middle of the stay: all of it where the stroke is a triangle
+/// over time, half where it is a sine. Creep of a held muscle makes less.
+const CONTINUES: (f64, f64) = (0.2, 2.0);
 /// The reading comes to its end at this share of its speed before at least: two thirds for a sine. An axis that stops there slows down.
 const AT_SPEED: f64 = 0.5;
 /// Meanwhile the pressure changes by less than this share of its range, as the other readings beside a drop-out.
@@ -47,7 +47,7 @@ pub(super) fn find(campaign: &Campaign, skipped: &[bool], usual: &Usual) -> Vec<
         for (value, side) in ends(r) {
             let count = runs(&r.stroke, value)
                 .into_iter()
-                .filter(|rows| rows.len() >= SHORTEST && goes_on(r, rows, side, usual))
+                .filter(|rows| rows.len() >= SHORTEST && continues(r, rows, side, usual))
                 .count();
             *stays.entry((value.to_bits(), side > 0.0)).or_default() += count;
         }
@@ -81,8 +81,8 @@ fn runs(column: &[f64], value: f64) -> Vec<Range<usize>> {
     runs
 }
 
-/// Whether the force shows that the muscle goes on beyond the end of the readings, and comes back.
-fn goes_on(r: &Recording, rows: &Range<usize>, side: f64, usual: &Usual) -> bool {
+/// Whether the force shows that the muscle continues beyond the end of the readings, and comes back.
+fn continues(r: &Recording, rows: &Range<usize>, side: f64, usual: &Usual) -> bool {
     let Some(force) = r.force.as_deref() else { return false };
     let (x, n) = (&r.stroke, (rows.len() / 2).max(SHORTEST / 2));
     if rows.start < n || rows.end + n > x.len() {
@@ -120,6 +120,6 @@ fn goes_on(r: &Recording, rows: &Range<usize>, side: f64, usual: &Usual) -> bool
         (middle - end).abs() > scatter && beyond > least
     }) && {
         let beyond = side * (middle - entry) / there;
-        (GOES_ON.0 * reach..=GOES_ON.1 * reach).contains(&beyond)
+        (CONTINUES.0 * reach..=CONTINUES.1 * reach).contains(&beyond)
     }
 }

@@ -1,7 +1,7 @@
 //! Values that a logger writes for a reading that it missed, such as 0 or 32767: one exact value in single rows all over a campaign.
 //!
 //! A zero of pressure, stroke and force in one row is the reading of a vented muscle at rest, which no surface of the force contradicts. But a
-//! muscle does not get there and back between two rows, and noise does not let three sensors repeat their values exactly. Where the other
+//! muscle does not vent and fill between two rows, and noise does not let three sensors repeat their values exactly. Where the other
 //! readings prove a channel's value to be missed readings in a dozen places, it is one in every other row that stands out from both
 //! neighbours with it, too: near a turn, or where the muscle is slack and no force contradicts it.
 
@@ -13,7 +13,7 @@ use crate::recording::dropouts::Dropout;
 use crate::recording::spikes::{self, ABOVE_NOISE, SUDDEN, change_beside, end_of_spike, spikes};
 use crate::recording::white_noise;
 
-/// So many proved single rows of one value make it known as that of missed readings. A muscle that turns at one value of a quantised
+/// This number of proved single rows of one value makes it known as that of missed readings. A muscle that turns at one value of a quantised
 /// column meets it once in a stroke: campaigns have about a dozen strokes, few of which are mistaken for faults.
 pub(super) const KNOWN: usize = 12;
 /// Three sensors that read one triple of values in as many single rows do not measure: noise lets two readings of one sensor be equal, not

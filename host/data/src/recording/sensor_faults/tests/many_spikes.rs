@@ -122,7 +122,7 @@ fn rows_in_which_all_sensors_step_away_are_missed_rows() {
     }
 }
 
-/// A muscle that is vented for a row, and pulls less; noise tells its readings from those of a logger.
+/// A muscle that is vented for a row, and pulls less; noise distinguishes its readings from those of a logger.
 #[test]
 fn a_vented_muscle_is_no_missed_row() {
     let mut campaign = campaign(11);
