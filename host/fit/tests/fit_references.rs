@@ -46,14 +46,39 @@ fn loops(points: &[Vec<f64>]) -> Campaign {
     Campaign::new(recordings)
 }
 
-#[test]
-fn separate_fits_are_those_of_numpy() {
-    let campaign = loops(&table("separate_fits_points.csv"));
-    let muscle = MuscleDescription::parse(
+/// The miniature muscle.
+fn miniature() -> MuscleDescription {
+    MuscleDescription::parse(
         "name=\"m\"\nkind=\"contractile\"\nrest_length_mm=39.16\nbraid_angle_deg=77.4\n\
          bladder_outer_diameter_mm=3.0\nbladder_wall_mm=0.5\n",
     )
-    .expect("valid");
+    .expect("valid")
+}
+
+/// Inches under the heading of millimetres: the force reaches zero long before any braid allows it.
+#[test]
+fn a_force_that_reaches_zero_far_too_early_questions_the_unit_of_the_displacement() {
+    // About the miniature muscle's: 7.7 % of free contraction at 552 kPa.
+    let at = |p: f64, k: i32| {
+        let x = 3.02e-3 * f64::from(k) / 60.0 * (p - 76.5e3) / 475.5e3;
+        [p, x, (2.75e-4 * (p - 76.5e3) - 43e3 * x).max(0.0)].to_vec()
+    };
+    let levels = [207e3, 276e3, 345e3, 414e3, 483e3, 552e3];
+    let points: Vec<Vec<f64>> = levels.into_iter().flat_map(|p| (0..=60).map(move |k| at(p, k))).collect();
+    let mut campaign = loops(&points);
+    let questions = |campaign: &Campaign| {
+        let fitted = fit(campaign, &miniature(), &Options::default()).expect("a fit");
+        fitted.summary.warnings.iter().any(|w| w.contains("check the unit of the displacement (inches?)"))
+    };
+    assert!(!questions(&campaign));
+    campaign.recordings.iter_mut().flat_map(|r| &mut r.stroke).for_each(|x| *x /= 25.4);
+    assert!(questions(&campaign));
+}
+
+#[test]
+fn separate_fits_are_those_of_numpy() {
+    let campaign = loops(&table("separate_fits_points.csv"));
+    let muscle = miniature();
     let mut fitted = fit(&campaign, &muscle, &Options::default()).expect("a fit");
     assert!((fitted.summary.deadband_kPa - 76.5).abs() < 1.0, "P0 {}", fitted.summary.deadband_kPa);
     // The reference takes P0 as given.

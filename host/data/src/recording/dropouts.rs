@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::constant_load::{self, HeldLoad};
 use super::places::{LISTED, listed, rows_and_times};
-use super::sensor_faults::{self, Kind, SensorFault, sensor_faults};
+use super::sensor_faults::{self, Kind, SensorFault, of_all_channels, sensor_faults};
 use super::unit_check::{InconsistentRecording, inconsistent_recordings};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
@@ -60,8 +60,13 @@ impl<'a> Screened<'a> {
     /// Screens a campaign. Recordings without a force are skipped: a drop-out and a real step look the same there.
     #[must_use]
     pub fn of(campaign: &'a Campaign) -> Self {
-        let inconsistent = inconsistent_recordings(campaign);
+        // Before a correction: the value of a missed row is in no unit.
+        let missed = of_all_channels(campaign);
         let mut campaign = Cow::Borrowed(campaign);
+        for fault in &missed {
+            fault.bridge(&mut campaign.to_mut().recordings[fault.recording]);
+        }
+        let inconsistent = inconsistent_recordings(&campaign);
         for a in &inconsistent {
             a.mistake.correct(&mut campaign.to_mut().recordings[a.recording]);
         }
@@ -77,12 +82,14 @@ impl<'a> Screened<'a> {
         }
         let odd: Vec<bool> =
             (0..campaign.recordings.len()).map(|i| inconsistent.iter().any(|a| a.recording == i)).collect();
-        let faults = sensor_faults(&campaign, &odd);
+        let mut faults = sensor_faults(&campaign, &odd, &dropouts);
         // A copy of the campaign is as large as the campaign.
         for fault in faults.iter().filter(|f| f.has_bridge()) {
             fault.bridge(&mut campaign.to_mut().recordings[fault.recording]);
         }
         let held_loads = constant_load::find(&campaign, &odd);
+        faults.extend(missed);
+        faults.sort_by_key(|f| (f.recording, f.rows.start));
         Self { campaign, inconsistent, dropouts, faults, held_loads }
     }
 

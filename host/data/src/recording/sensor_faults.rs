@@ -8,13 +8,17 @@
 //! | fault | reading | contradiction | file |
 //! | --- | --- | --- | --- |
 //! | frozen, saturated | one exact value for many rows | the expected force, or the residual, changes meanwhile | `constant_runs` |
+//! | saturated stroke | one value at an end, reached at speed | the force continues, and comes back | `clipped_stroke` |
 //! | dead | one value through a recording | a force that this value excludes | `dead_channels` |
 //! | drop-out | a step away, and back | no other reading steps | `jumps` |
+//! | missed readings | one value in single rows | proved in many other rows | `glitches` |
 //!
 //! Drop-outs of the pressure are those of [`super::dropouts`].
 
+mod clipped_stroke;
 mod constant_runs;
 mod dead_channels;
+mod glitches;
 mod jumps;
 mod stroke_motion;
 #[cfg(test)]
@@ -22,11 +26,14 @@ mod tests;
 
 use std::ops::Range;
 
-use super::dropouts::ExpectedForce;
+use super::dropouts::{Dropout, ExpectedForce};
 use super::places::{listed, rows_and_times};
+use super::spikes::{self, without_spikes};
 use super::{Campaign, Recording};
 use crate::pluralise::pluralise;
 use crate::statistics::{median, quantile};
+
+pub(super) use glitches::of_all_channels;
 
 /// A column that a sensor reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -92,6 +99,8 @@ pub enum Kind {
     Dead,
     /// It steps away and back.
     DropOut,
+    /// All sensors step away and back together: the logger missed a row.
+    Missed,
 }
 
 /// Rows of a recording in which a sensor failed.
@@ -114,7 +123,7 @@ struct Usual {
     expected: ExpectedForce,
     /// Median size of the residual of a recording, N, taken at the median recording.
     residual: f64,
-    /// Ranges of pressure, stroke and force without the few farthest values, SI.
+    /// Ranges of pressure, stroke and force without spikes and the few farthest values, SI.
     spans: [f64; 3],
     /// The largest usual pressure, Pa.
     top_pressure: f64,
@@ -127,10 +136,10 @@ impl Usual {
         let expected = ExpectedForce::of(campaign, &masks)?;
         let taken = || campaign.recordings.iter().zip(skipped).filter(|(_, skip)| !**skip).map(|(r, _)| r);
         let spans = Channel::ALL.map(|c| {
-            let mut some: Vec<f64> = taken().flat_map(|r| downsampled(c.of(r))).collect();
+            let mut some: Vec<f64> = taken().flat_map(|r| without_spikes(c.of(r), stride(r.len()))).collect();
             quantile(&mut some, 0.998) - quantile(&mut some, 0.002)
         });
-        let mut tops: Vec<f64> = taken().flat_map(|r| downsampled(&r.pressure)).collect();
+        let mut tops: Vec<f64> = taken().flat_map(|r| without_spikes(&r.pressure, stride(r.len()))).collect();
         let top_pressure = quantile(&mut tops, 0.99);
         let mut residuals: Vec<f64> = taken()
             .filter(|r| r.force.is_some() && !r.is_empty())
@@ -173,8 +182,8 @@ fn downsampled(column: &[f64]) -> impl Iterator<Item = f64> + '_ {
 }
 
 /// The failures of sensors in a campaign, in the order of recordings and rows. Recordings that are `skipped` (another unit, sign or zero
-/// than the others) are neither judged nor used as reference.
-pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<SensorFault> {
+/// than the others) are neither judged nor used as reference. `dropouts` are those that were found, and bridged, before.
+pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool], dropouts: &[Dropout]) -> Vec<SensorFault> {
     // A dead recording bends the surface; it is found first, and the rest is judged without it.
     let Some(usual) = Usual::of(campaign, skipped) else { return Vec::new() };
     let mut faults = dead_channels::find(campaign, skipped, &usual);
@@ -184,29 +193,42 @@ pub(super) fn sensor_faults(campaign: &Campaign, skipped: &[bool]) -> Vec<Sensor
     }
     let usual = if faults.is_empty() { Some(usual) } else { Usual::of(campaign, &skipped) };
     let Some(usual) = usual else { return faults };
+    let clipped = clipped_stroke::find(campaign, &skipped, &usual);
     let repeats = constant_runs::Repeats::of(campaign);
     for (index, r) in campaign.recordings.iter().enumerate().filter(|(i, _)| !skipped[*i]) {
         if r.force.is_none() {
             continue;
         }
-        let mut found = constant_runs::find(campaign, index, &usual, &repeats);
+        let overlap = |f: &SensorFault, with: &SensorFault| {
+            f.rows.start < with.rows.end && with.rows.start < f.rows.end
+        };
+        let mut found: Vec<SensorFault> = clipped.iter().filter(|f| f.recording == index).cloned().collect();
+        let mut constant = constant_runs::find(campaign, index, &usual, &repeats);
+        constant.retain(|fault| !found.iter().any(|f| f.channel == fault.channel && overlap(f, fault)));
+        found.extend(constant);
         for fault in jumps::find(campaign, index, &usual) {
-            let overlaps = |f: &SensorFault| f.rows.start < fault.rows.end && fault.rows.start < f.rows.end;
-            if !found.iter().any(overlaps) {
+            if !found.iter().any(|f| overlap(f, &fault)) {
                 found.push(fault);
             }
         }
         found.sort_by_key(|f| f.rows.start);
         faults.extend(found);
     }
+    faults.extend(glitches::of_known_values(campaign, &skipped, &faults, dropouts));
     faults.sort_by_key(|f| (f.recording, f.rows.start));
     faults
 }
 
 impl SensorFault {
-    /// Whether its readings are replaced. Force stays as it was read: no motion is derived from it.
+    /// Whether its readings are replaced. A force stays as it was read, as no motion is derived from it, unless it is that of a spike: its
+    /// range is.
     pub(super) fn has_bridge(&self) -> bool {
-        self.channel != Channel::Force && self.kind != Kind::Dead
+        match self.kind {
+            Kind::Dead => false,
+            Kind::Missed => true,
+            Kind::DropOut if self.rows.len() < spikes::LONGEST => true,
+            Kind::Frozen | Kind::Saturated | Kind::DropOut => self.channel != Channel::Force,
+        }
     }
 
     /// Replaces the failed readings by the line between those beside, good enough to follow the motion.
@@ -234,6 +256,16 @@ impl SensorFault {
 
 /// One sentence for each sensor and kind of failure: places, rows and the remedy.
 pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<String> {
+    let missed: Vec<&SensorFault> =
+        faults.iter().filter(|f| f.kind == Kind::Missed && f.channel == Channel::Pressure).collect();
+    let rows: usize = missed.iter().map(|f| f.rows.len()).sum();
+    let missed = (!missed.is_empty()).then(|| {
+        format!(
+            "failed logger: pressure, stroke and force step away and back together within one row each; {} excluded: {}; check the logger",
+            pluralise(rows, "row"),
+            listed(missed.iter().map(|f| f.place(campaign)))
+        )
+    });
     let kinds = [Kind::Dead, Kind::Frozen, Kind::Saturated, Kind::DropOut];
     let pairs = Channel::ALL.into_iter().flat_map(|c| kinds.into_iter().map(move |k| (c, k)));
     let sentence = |(channel, kind): (Channel, Kind)| {
@@ -252,7 +284,9 @@ pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<Strin
             Kind::Saturated => {
                 ("stops at the end of its range", "use a sensor or an amplifier of a larger range")
             }
-            Kind::DropOut => ("steps away and back within one row each", "check connector and cable"),
+            Kind::DropOut | Kind::Missed => {
+                ("steps away and back within one row each", "check connector and cable")
+            }
         };
         let name = channel.name();
         let rows: usize = of.iter().map(|f| f.rows.len()).sum();
@@ -262,5 +296,5 @@ pub(super) fn describe(faults: &[SensorFault], campaign: &Campaign) -> Vec<Strin
             listed(of.iter().map(|f| f.place(campaign)))
         ))
     };
-    pairs.filter_map(sentence).collect()
+    missed.into_iter().chain(pairs.filter_map(sentence)).collect()
 }

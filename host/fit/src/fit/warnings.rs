@@ -1,10 +1,12 @@
 //! Warnings about a fit: what was seen, what it means, what to do.
 
+use super::problem::Problem;
 use super::screen::PointUse;
 use super::solution::Solution;
 use super::weights::scatter;
 
 use pam_data::pluralise::pluralise;
+use pam_data::statistics::median;
 
 /// Above this mean error, percent of blocked force, a wrong unit, sign or dimension is more likely than physics that the model lacks.
 const NO_MUSCLE: f64 = 10.0;
@@ -19,12 +21,22 @@ const VENTED: std::ops::RangeInclusive<f64> = 75e3..=107e3;
 /// the mounted length are smaller.
 const ABOVE_BLOCKED: f64 = 0.1;
 
+/// At a pressure well above the deadband, the force of a muscle reaches zero no earlier than at this share of the contraction at which a
+/// braid alone ceases to pull: a quarter of the least of the three muscles in the thesis of E. G. Hocking (the miniature one, 0.0772 of 0.41 at
+/// 552 kPa; the others 0.29 and 0.27 of 0.40). Inches under millimetres divide it by 25.4.
+const LEAST_FREE: f64 = 0.05;
+/// Well above: the miniature muscle reaches 0.066 at this many times its deadband.
+const WELL_ABOVE: f64 = 3.5;
+/// The force has reached zero below this share of the largest at that pressure; pressures within as much of the highest are taken together.
+const ZERO: f64 = 0.05;
+
 /// All warnings. `mean_error` is that of all mid-lines by eq. 24, `left_out` the error of each pressure predicted from the others; both
 /// in percent of blocked force.
 #[must_use]
 pub(super) fn warnings(solution: &Solution, mean_error: f64, left_out: &[Option<f64>]) -> Vec<String> {
     let mut out = solution.warnings.clone();
     agreement(solution, mean_error, &mut out);
+    displacement(solution, &mut out);
     amount(solution, &mut out);
     blocked_force(solution, &mut out);
     lengths(solution, &mut out);
@@ -81,6 +93,36 @@ fn agreement(solution: &Solution, mean_error: f64, out: &mut Vec<String>) {
         out.push(format!(
             "the table does not describe these recordings: its mean error is {mean_error:.0} % of the blocked force; check the units of \
              force and pressure, the sign of the displacement, and the muscle's dimensions"
+        ));
+    }
+}
+
+/// Whether the unit of the displacement can be right: where the force reaches zero at the highest pressure.
+fn displacement(solution: &Solution, out: &mut Vec<String>) {
+    let Problem { points, braid, shift, .. } = &solution.problem;
+    let (p0, rest) = (solution.deadband(), braid.rest_length());
+    // Fibres that enclose 54.7° with the axis make no force at any pressure: sin² = 2/3, cos = 1/√3.
+    let of_braid = 1.0 - braid.fibre_length() / (3.0_f64.sqrt() * rest);
+    let read = || points.list.iter().zip(shift).filter(|(p, _)| !p.dropout);
+    let highest = read().map(|(p, _)| p.pressure).fold(0.0, f64::max);
+    if !(of_braid > 0.0 && highest > WELL_ABOVE * p0.max(0.0)) {
+        return;
+    }
+    let at_highest = || read().filter(|(p, _)| p.pressure > (1.0 - ZERO) * highest);
+    let largest = at_highest().map(|(p, _)| p.force).fold(0.0, f64::max);
+    let slack = at_highest().filter(|(p, _)| p.force.abs() < ZERO * largest);
+    let mut contractions: Vec<f64> = slack.map(|(p, shift)| (p.stroke + shift) / rest).collect();
+    if contractions.is_empty() {
+        return;
+    }
+    let free = median(&mut contractions);
+    if (0.0..LEAST_FREE * of_braid).contains(&free) {
+        out.push(format!(
+            "the force reaches zero at {:.0} kPa and a contraction of {free:.4}, {:.1} % of what this braid allows ({of_braid:.2}); more than \
+             {:.0} % is usual: check the unit of the displacement (inches?), its zero, and the rest length",
+            highest / 1e3,
+            100.0 * free / of_braid,
+            100.0 * LEAST_FREE
         ));
     }
 }

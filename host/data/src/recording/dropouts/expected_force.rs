@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::steps::Stretch;
 use crate::recording::force_surface::{ForceSurface, TERMS};
-use crate::recording::spikes::spikes;
+use crate::recording::spikes::{spikes, without_spikes};
 use crate::recording::{Campaign, Recording, white_noise};
 use crate::statistics::{extremes, median, quantile};
 
@@ -27,7 +27,7 @@ const FOLLOWS: f64 = 0.15;
 const SUPPORTED: f64 = 0.3;
 /// How long after a stretch the force is checked for a late reaction: s, and rows at least.
 const LATE: (f64, usize) = (0.3, 2);
-/// A spike of pressure or stroke is at least this share of the usual range. Few spikes far away would bend the surface.
+/// A spike is at least this share of the usual range. Few spikes far away would bend the surface.
 const SPIKE: f64 = 0.1;
 /// This share of the rows lies above the usual range, and as much below.
 const RARE: f64 = 0.01;
@@ -49,10 +49,9 @@ pub(in crate::recording) struct ExpectedForce {
     ceiling: f64,
 }
 
-/// The range of a column without few readings far away, SI.
+/// The range of a column without spikes and few readings far away, SI.
 fn usual_span(campaign: &Campaign, of: fn(&Recording) -> &[f64], stride: usize) -> f64 {
-    let mut some: Vec<f64> =
-        campaign.recordings.iter().flat_map(|r| of(r).iter().step_by(stride)).copied().collect();
+    let mut some: Vec<f64> = campaign.recordings.iter().flat_map(|r| without_spikes(of(r), stride)).collect();
     if some.is_empty() { 0.0 } else { quantile(&mut some, 1.0 - RARE) - quantile(&mut some, RARE) }
 }
 
@@ -64,9 +63,14 @@ impl ExpectedForce {
         let mut rows: Vec<[f64; 3]> = Vec::with_capacity(total / stride + 1);
         let pressure_step = SPIKE * usual_span(campaign, |r| &r.pressure, stride);
         let stroke_step = SPIKE * usual_span(campaign, |r| &r.stroke, stride);
+        let force_step = SPIKE * usual_span(campaign, |r| r.force.as_deref().unwrap_or(&[]), stride);
         for (r, mask) in campaign.recordings.iter().zip(masks) {
             let Some(force) = r.force.as_deref() else { continue };
-            let away = [spikes(&r.pressure, pressure_step), spikes(&r.stroke, stroke_step)];
+            let away = [
+                spikes(&r.pressure, pressure_step),
+                spikes(&r.stroke, stroke_step),
+                spikes(force, force_step),
+            ];
             let mut next = mask.iter().peekable();
             let mut away = away.each_ref().map(|spikes| spikes.iter().peekable());
             for i in (0..r.len()).step_by(stride) {
@@ -75,7 +79,7 @@ impl ExpectedForce {
                     while spikes.next_if(|s| s.end <= i).is_some() {}
                     spikes.peek().is_some_and(|s| s.contains(&i))
                 });
-                if spiked == [false; 2] && next.peek().is_none_or(|m| i < m.start) {
+                if spiked == [false; 3] && next.peek().is_none_or(|m| i < m.start) {
                     rows.push([r.pressure[i], r.stroke[i], force[i]]);
                 }
             }

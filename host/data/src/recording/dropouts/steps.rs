@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::unit;
+use crate::recording::spikes::without_spikes;
 use crate::recording::{Campaign, Recording, white_noise};
 use crate::statistics::ranked;
 
@@ -39,12 +40,12 @@ impl Scale {
     pub(super) fn of(campaign: &Campaign) -> Option<Self> {
         let with_force = || campaign.recordings.iter().filter(|r| r.force.is_some());
         let stride = (campaign.samples() / ROWS).max(1);
-        let some = with_force().flat_map(|r| r.pressure.iter().step_by(stride));
+        let some = with_force().flat_map(|r| without_spikes(&r.pressure, stride));
         let mut sizes: Vec<f64> = some.map(|p| p.abs()).collect();
         if sizes.is_empty() {
             return None;
         }
-        // Few readings at full scale must not set it.
+        // Readings at full scale must not set it.
         let rank = (0.99 * sizes.len() as f64) as usize;
         let highest = ranked(&mut sizes, rank);
         let noise = with_force().map(|r| white_noise(&r.pressure)).fold(0.0, f64::max);

@@ -51,7 +51,8 @@ pub(super) fn stamped(sample: &Sample) -> Option<usize> {
 fn fraction(sample: &Sample) -> Option<(usize, usize, &'static str)> {
     let whole = |c: &SampleColumn| {
         let seconds = c.name.unit.is_none_or(|u| u.unit == "s" && u.scale == 1.0);
-        let clock = c.is_stamped() || c.is_numeric() && seconds && c.quantity_by_name() == Some(Quantity::Time);
+        let clock =
+            c.is_stamped() || c.is_numeric() && seconds && c.quantity_by_name() == Some(Quantity::Time);
         clock && c.values().all(|v| v.fract() == 0.0)
     };
     let clocks: Vec<usize> = (0..sample.columns.len()).filter(|n| whole(&sample.columns[*n])).collect();

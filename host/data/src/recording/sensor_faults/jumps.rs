@@ -1,6 +1,6 @@
 //! Drop-outs: the reading steps away within one row and back within one row, and no other reading steps. A step of the pressure must change
-//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes of pressure and stroke are found
-//! by the same, and single zeros of the force; its other spikes are outliers of a fit.
+//! the expected force, which does not follow ([`super::super::dropouts`] finds most of them from less). Spikes, which last a few rows at most, are
+//! found by the same, or where no other reading steps; smaller spikes of the force are outliers of a fit.
 //!
 //! A muscle at rest between two strokes is no drop-out of the force: near its full length a small stroke changes the force much. Its
 //! force comes and goes as fast as in the rows beside, or with a stroke or pressure that steps away and back, too. Nor is friction one that
@@ -30,6 +30,13 @@ const LONGEST: f64 = 10.0;
 /// A drop-out of the pressure changes the expected force by this share of the range of forces, and the force by this share of that at most.
 const UNFELT: (f64, f64) = (0.1, 0.3);
 
+/// A spike of the pressure while the other readings are quiet is at least this share of the reading before: a valve's kick at the gauge is
+/// less, as for the drop-outs of the pressure.
+const KICK: f64 = 0.5;
+/// A spike of the force leaves the reading before, and the expected force, by this share of the range of forces, and six usual residuals:
+/// friction that turns within a row changes it by two. What an end of the range or a bad contact makes is larger than a muscle's shock.
+const SHOCK: f64 = 0.25;
+
 /// The drop-outs in a recording, by channel.
 pub(super) fn find(campaign: &Campaign, index: usize, usual: &Usual) -> Vec<SensorFault> {
     let r = &campaign.recordings[index];
@@ -56,11 +63,20 @@ fn drop_outs(r: &Recording, index: usize, channel: Channel, usual: &Usual) -> Ve
     while i < column.len() {
         // What lies between two spikes is no drop-out.
         if let Some(end) = end_of_spike(column, i, step) {
+            let alone = || quiet(i) && quiet(end);
+            let away = (column[i] - column[i - 1]).abs();
             let failed = match channel {
-                Channel::Pressure => is_unfelt(r, i..end, usual),
-                Channel::Stroke => is_unfelt(r, i..end, usual) || quiet(i) && quiet(end),
-                // Loggers write zero for a reading that they missed; other spikes may be a shock.
-                Channel::Force => column[i..end].iter().all(|f| *f == 0.0) && quiet(i) && quiet(end),
+                Channel::Pressure => {
+                    is_unfelt(r, i..end, usual) || away > KICK * column[i - 1].abs() && alone()
+                }
+                Channel::Stroke => is_unfelt(r, i..end, usual) || alone(),
+                // Loggers write zero for a reading that they missed; other small spikes may be a shock.
+                Channel::Force => {
+                    let zeros = column[i..end].iter().all(|f| *f == 0.0);
+                    let least = usual.noticeable(SHOCK);
+                    let off = (column[i] - usual.expected.at(r, i)).abs();
+                    (zeros || away.min(off) > least) && alone()
+                }
             };
             if failed {
                 found.push(drop_out(index, i..end, channel, column[i]));

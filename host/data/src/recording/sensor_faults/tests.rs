@@ -1,6 +1,8 @@
 use super::*;
 use crate::recording::dropouts::Screened;
 
+mod many_spikes;
+
 /// A bench of six files of loops at one pressure each, with readings of a converter of 12 bits.
 fn campaign(seed: u32) -> Campaign {
     let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12_345);
