@@ -275,7 +275,7 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// The highest generation that anything kept of a muscle is of: both of its tables, for after a rollback the newer one is the one before,
-    /// and what effects remember, for a damaged selection gives way to one of before. A new table must not find memories of another.
+    /// and what effects remember, for a damaged selection is replaced by an earlier one. A new table must not find memories of another.
     fn newest(&mut self, side: Side, selected: Option<Selected>) -> Result<u32, StoreFault> {
         let remembered = self.bytes(MEMORIES + side.index() as u8)?.map_or(0, |bytes| generation_of(bytes).0);
         let tables = selected.map(|selected| (selected.table.generation, selected.previous));
@@ -363,7 +363,7 @@ impl<F: NorFlash> Store<F> {
             Err(_) => {}
         }
         self.erase()?;
-        // First, so that nobody takes what is left for a new device.
+        // First: without it, the remaining store looks like that of a new device.
         self.put_layout()?;
         starts = 0;
         self.count(&mut starts).map_err(fault_of)?;

@@ -6,7 +6,7 @@
 //! | sensor stuck | `stuck_ticks` of bit-equal readings while the command moved by 20 kPa |
 //! | sensor noisy | the last of `noisy_jumps` jumps within 256 ticks |
 //! | sensors disagree | `disagree_ticks` of table and load cell apart by `disagree_n`; where that is zero, in modes that control the stroke, of a table that is above the load cell by half of the blocked force |
-//! | stroke stands still | without a load cell, while the stroke of one muscle is controlled: `follow_ticks` of a force of the table that has risen by half of the blocked force and the load of the settings, while the stroke has stayed within its band |
+//! | stroke does not move | without a load cell, while the stroke of one muscle is controlled: `follow_ticks` of a force of the table that has risen by half of the blocked force and the load of the settings, while the stroke has stayed within its band |
 //! | pressure sensors disagree | `follow_ticks` of the two apart by `second_pressure_pa` |
 //! | supply pressure low | `follow_ticks` below `supply_low_pa` |
 //! | enable open | `debounce_ticks` |
@@ -98,7 +98,7 @@ struct OneSensor {
 }
 
 impl OneSensor {
-    /// Whether a reading may be true by itself and after the one before. What is not fitted is not judged.
+    /// Whether a reading may be true alone and after the one before. What is not fitted is not judged.
     fn may_be(&self, watch: &SensorWatch, value: f32) -> bool {
         let calm = !self.seen || (value - self.last).abs() <= watch.jump;
         !watch.fitted || (value >= watch.low && value <= watch.high && calm)
@@ -187,7 +187,7 @@ pub struct Seen {
 }
 
 impl SideWatch {
-    /// Whether the readings of pressure and stroke of a tick that has not been looked at yet may be true.
+    /// Whether the readings of pressure and stroke of a tick that has not been examined yet may be true.
     pub(crate) fn may_be(&self, now: &Readings, settings: &Settings) -> bool {
         self.pressure.may_be(&settings.pressure, now.pressure_pa)
             && self.stroke.may_be(&settings.stroke, now.stroke_m)

@@ -118,7 +118,7 @@ impl Controller {
         let mut waits_for = None;
         for side in Side::ALL {
             let Some(now) = self.sides[side.index()].readings else {
-                // What is not read in this tick decides nothing, and the time goes on.
+                // What is not read in this tick decides nothing, and the time continues.
                 if self.tested[side.index()] {
                     waits_for = waits_for.or(Some((side, self.sides[side.index()].sample.pressure_pa)));
                 }

@@ -39,7 +39,7 @@ fn check(actuator: &mut Actuator, seen: &Seen, settings: &Settings, report: &mut
 }
 
 impl Controller {
-    /// The faults that hold, as bits. A pair of valves goes on filling while a command is held: where the pressure does not answer, it is not.
+    /// The faults that hold, as bits. A pair of valves continues to fill while a command is held: where the pressure does not answer, it is not.
     pub(super) fn hold_on(&self) -> u32 {
         let settings = &self.settings;
         let never = if settings.valves.is_fitted() { 1 << Fault::PressureNotRising.code() } else { 0 };

@@ -1,8 +1,8 @@
-//! A stroke that stands still while it is controlled: a frozen sensor has the muscle filled up to its highest pressure.
+//! A stroke that does not move while it is controlled: a frozen sensor has the muscle filled up to its highest pressure.
 //!
-//! With a load cell the table tells: at a stroke at which the muscle is not, it says more force than the cell (the watch of both sensors). Without
+//! With a load cell the table shows it: at a stroke at which the muscle is not, it says more force than the cell (the watch of both sensors). Without
 //! one, the force of the table may rise by half of the blocked force and the known load while the stroke stays where it is. More is a sensor
-//! that stands still, or a muscle that something blocks: neither is controlled by its stroke.
+//! that does not move, or a muscle that something blocks: neither is controlled by its stroke.
 
 use model_core::link::messages::{Fault, Mode, Sensor};
 use model_core::link::settings::Settings;
@@ -27,7 +27,7 @@ impl Actuator {
         self.model.as_ref().map_or(0.0, Model::half_blocked_n)
     }
 
-    /// A stroke that stands still while it is controlled. In a joint, both muscles may rise together.
+    /// A stroke that does not move while it is controlled. In a joint, both muscles may rise together.
     pub(super) fn stands(&mut self, mode: Mode, settings: &Settings) -> Option<Finding> {
         if settings.force.fitted || mode != Mode::Stroke {
             return None;

@@ -1,6 +1,6 @@
 //! Whether the reading of the pressure answers what the valves let in.
 //!
-//! The loop of a pair is closed over the pressure sensor: one that stands still a little below the command would have the muscle filled up to
+//! The loop of a pair is closed over the pressure sensor: one that is frozen a little below the command would have the muscle filled up to
 //! the pressure of the supply. What the fill valve has let in since the reading last rose is therefore counted:
 //!
 //! ```text

@@ -56,7 +56,7 @@ const SETTLED: f64 = 0.3;
 
 /// Steps a device's pressure between two values (Pa) and identifies its regulator, except the deadband. The steps are commands of the
 /// regulator itself, not those that an earlier model of it makes of a demand. The device's settings are restored also where the steps fail, but
-/// not where this program is killed or the device is disconnected: it then keeps those of the steps, a gain of one without offset, line, lead
+/// not where this program is stopped or the device is disconnected: it then keeps those of the steps, a gain of one without offset, line, lead
 /// and deadband, until settings are sent. [`Found::keep`] stores the result.
 ///
 /// # Errors

@@ -20,8 +20,8 @@ use super::verdict::{Diagnosis, Outcome, Verdict, WhyNot};
 /// Finds out what the model leaves out of a campaign, and whether the description of the recordings and of the muscle can be right. `plain`
 /// is the fit to these recordings without effects.
 ///
-/// A campaign is not judged where its units or signs leave no muscle: where that fit fails or its table is useless for control, and stays
-/// so with the named effects. Where other dimensions of the muscle explain all that an effect explains, a remark says so.
+/// A campaign is not judged where its units or signs leave no muscle: where that fit fails or its table is useless for control, also
+/// with the named effects. Where other dimensions of the muscle explain all that an effect explains, a remark gives them.
 ///
 /// # Errors
 /// As [`history::diagnose`].
@@ -33,7 +33,7 @@ pub fn diagnose_described(
 ) -> Result<Diagnosis> {
     let geometry = muscle.geometry();
     let mut diagnosis = history::diagnose(campaign, &geometry, options)?;
-    // At held lengths a fit looks for the dimensions by itself, and the history judges the rest.
+    // At held lengths a fit already looks for the dimensions, and the history judges the rest.
     let moves = campaign.mountings().is_none();
     if diagnosis.judged() && options.given.is_empty() && moves {
         if let Some(why) = implausible(campaign, muscle, &diagnosis, plain) {

@@ -108,7 +108,7 @@ impl Limits {
     }
 
     /// The error of a reading, N. A reading at an end of the sensor's range only bounds the force: `None` where the model agrees with the
-    /// bound. At the lower end a slack muscle agrees, whatever the sensor reads of it.
+    /// bound. At the lower end a slack muscle agrees, regardless of the reading.
     fn error(&self, reading: f64, model: f64) -> Option<f64> {
         let over = if self.low == Some(reading) {
             model - reading.max(0.0)
@@ -503,7 +503,7 @@ mod tests {
     #[test]
     fn readings_at_an_end_of_the_range_count_only_where_the_model_disagrees() {
         let limits = Limits { low: Some(-8.0), high: Some(100.0) };
-        // A slack muscle pulls nothing, whatever the offset of the load cell is.
+        // A slack muscle pulls nothing, regardless of the offset of the load cell.
         assert_eq!(limits.error(-8.0, 0.0), None);
         assert_eq!(limits.error(-8.0, -20.0), None);
         assert_eq!(limits.error(-8.0, 3.0), Some(3.0));

@@ -33,7 +33,7 @@ pub enum GeometryError {
     RestLength,
     /// The braid angle is not between 0° and 90° from the radial plane.
     BraidAngle,
-    /// The outer diameter is not a positive number of metres up to 100, or gives constants that are no numbers.
+    /// The outer diameter is not a positive number of metres up to 100, or gives constants that are not finite.
     OuterDiameter,
     /// The wall is not positive or not thinner than the radius.
     Wall,
@@ -140,7 +140,7 @@ impl<T: Scalar> Geometry<T> {
             fibre,
             turns,
         };
-        // A diameter that is nothing beside the length, or the length beside it, gives constants that are no numbers.
+        // A diameter that is nothing beside the length, or the length beside it, gives constants that are not finite.
         let all = [
             braid.inv_rest_length,
             braid.inv_rest_radius,

@@ -90,7 +90,7 @@ fn a_known_load_may_be_lifted_before_the_stroke_moves() {
         s.stroke_loop.load_n = load_n;
     });
     to_stroke(&mut controller, 1e-4);
-    // It stands on its support until the muscle carries it, and then has its place.
+    // It rests on its support until the muscle carries it, and then has its place.
     let read = |_: u32, pressure_pa: f32| (if pressure_pa > 380e3 { 1e-4 } else { 0.0 }, 0.0);
     pass(&mut controller, &mut 0.0, 5_000, read);
     assert_eq!((controller.state(), latched(&controller)), (State::Running, None));

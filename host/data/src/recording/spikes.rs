@@ -71,7 +71,7 @@ pub(super) fn without_spikes(column: &[f64], stride: usize) -> impl Iterator<Ite
         while spikes.next_if(|s| s.end <= i).is_some() {}
         spikes.peek().is_none_or(|s| i < s.start).then(|| column[i])
     };
-    (0..column.len()).step_by(stride.max(1)).filter_map(move |i| reading(i))
+    (0..column.len()).step_by(stride.max(1)).filter_map(reading)
 }
 
 /// All spikes of a column, in order.
