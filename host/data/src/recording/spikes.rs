@@ -67,7 +67,7 @@ pub(super) const ABOVE_NOISE: f64 = 12.0;
 /// quantile of all readings is that of the spikes where their share exceeds its rank.
 pub(super) fn without_spikes(column: &[f64], stride: usize) -> impl Iterator<Item = f64> + '_ {
     let mut spikes = spikes(column, ABOVE_NOISE * white_noise(column)).into_iter().peekable();
-    let mut reading = move |i: usize| {
+    let reading = move |i: usize| {
         while spikes.next_if(|s| s.end <= i).is_some() {}
         spikes.peek().is_none_or(|s| i < s.start).then(|| column[i])
     };
