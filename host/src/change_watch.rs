@@ -350,7 +350,7 @@ mod tests {
     fn nothing_is_named_where_nothing_changed() {
         let update = watched(1.0);
         assert_eq!(update.names(), Some(Vec::new()), "{}", update.description());
-        assert!(update.description().starts_with("Nothing changed"), "{}", update.description());
+        assert!(update.description().starts_with("No change"), "{}", update.description());
     }
 
     #[test]

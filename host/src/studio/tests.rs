@@ -309,7 +309,7 @@ fn a_run_is_compared_with_an_earlier_recording_and_can_be_vented_meanwhile() {
         studio.shared.post(Posted::Watch { reference: Compared::Recordings }).await.unwrap();
         let said = studio.next(|m| m["k"] == "c").await;
         assert_eq!(said["changed"], false, "{said}");
-        assert!(said["text"].as_str().unwrap().starts_with("Nothing changed"), "{said}");
+        assert!(said["text"].as_str().unwrap().starts_with("No change"), "{said}");
         assert!(studio.press_vent().starts_with("HTTP/1.1 204"));
         studio.state(|s| s["state"] == "disarmed").await;
     });
