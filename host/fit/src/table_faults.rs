@@ -242,8 +242,8 @@ mod tests {
     fn a_muscle_that_pushes_under_pressure_is_a_fault() {
         let mut table = model_core::table::example();
         assert!(push(&table).is_none());
-        // Beyond the contraction at which its fibres are neutral, every muscle pushes.
-        table.tested.contraction_low = 0.6;
+        // Beyond its free contraction every muscle pushes.
+        (table.tested.contraction_low, table.tested.contraction_high) = (0.15, 0.2);
         assert!(push(&table).is_some_and(|f| f.contains("pulls there")), "{:?}", push(&table));
     }
 
