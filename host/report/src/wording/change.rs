@@ -314,7 +314,7 @@ fn one(text: &mut String, m: &Changed) {
     }
     let _ = writeln!(text, "  law          {}", m.change.about().changed.law);
     let _ = writeln!(text, "  since        {}", since(&m.since));
-    let _ = writeln!(text, "  belongs to   {}", owner(m.owner));
+    let _ = writeln!(text, "  belongs to   {}", owner(m.owner).replace("'s", ""));
     let _ = writeln!(text, "  what to do   {}", remedy(m.change));
     if !m.confusable_with.is_empty() {
         let _ = writeln!(text, "  alternatives {}", m.confusable_with.join(", "));
