@@ -72,8 +72,12 @@ pub fn slope<T: Scalar>(c: &Cubic<T>, u: T) -> T {
 #[inline]
 pub fn turns<T: Scalar>(c: &Cubic<T>) -> [T; 2] {
     let third = c[3] + c[3] + c[3];
-    // No real root is one that is not a number.
-    let root = (c[2] * c[2] - c[1] * third).sqrt();
+    let square = c[2] * c[2] - c[1] * third;
+    if !(square >= T::ZERO) {
+        return [-(T::ONE / T::ZERO); 2];
+    }
+    // The compiler must see that it is not negative: only then the floating-point unit takes the root without a call.
+    let root = square.at_least(T::ZERO).sqrt();
     let sum = if c[2] < T::ZERO { root - c[2] } else { -root - c[2] };
     [sum / third, c[1] / sum]
 }
