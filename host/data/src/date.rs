@@ -118,15 +118,6 @@ pub(crate) fn time_stamp_in(text: &str, order: DateOrder) -> Option<f64> {
 
 /// A date alone, s since 1970 at its midnight, in the forms that [`time_stamp_in`] reads before a time of day. A spreadsheet writes the
 /// midnight behind it.
-///
-/// ```
-/// use pam_data::date::{DateOrder, date_in};
-/// let day = Some(1_795_219_200.0);
-/// assert_eq!(date_in("2026-11-21", DateOrder::YearFirst), day);
-/// assert_eq!(date_in("21.11.2026 00:00:00", DateOrder::YearFirst), day);
-/// assert_eq!(date_in("11/21/2026", DateOrder::MonthFirst), day);
-/// assert_eq!(date_in("2026-11-21 13:30:00", DateOrder::YearFirst), None);
-/// ```
 #[must_use]
 pub(crate) fn date_in(text: &str, order: DateOrder) -> Option<f64> {
     let (date, rest) = calendar_date(text.trim().as_bytes(), order)?;
@@ -357,6 +348,15 @@ fn iso_8601(seconds: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_date_alone_is_its_midnight() {
+        let day = Some(1_795_219_200.0);
+        assert_eq!(date_in("2026-11-21", DateOrder::YearFirst), day);
+        assert_eq!(date_in("21.11.2026 00:00:00", DateOrder::YearFirst), day);
+        assert_eq!(date_in("11/21/2026", DateOrder::MonthFirst), day);
+        assert_eq!(date_in("2026-11-21 13:30:00", DateOrder::YearFirst), None);
+    }
 
     #[test]
     fn time_stamps_of_loggers_are_read_and_ambiguous_ones_are_not() {
