@@ -1,25 +1,22 @@
 //! Import descriptions by guess: the same readings in forms of loggers and test machines, and pressures in names.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
+mod guessed;
+
 use std::fmt::Write as _;
 use std::io::Write as _;
 
+use guessed::{Guessed, guessed};
 use pam_data::error::Error;
 use pam_data::recording::import_guess::{Guess, guess_among};
-use pam_data::recording::{Import, Reader, Recording};
+use pam_data::recording::{Reader, Recording};
 
 /// Reads files by the description that all of them give.
 fn read(files: &[(&str, Vec<u8>)]) -> (Guess, Result<Vec<Recording>, Error>) {
-    let folder = tempfile::tempdir().unwrap();
-    let paths: Vec<_> = files.iter().map(|(name, _)| folder.path().join(name)).collect();
-    for (path, (_, bytes)) in paths.iter().zip(files) {
-        std::fs::write(path, bytes).unwrap();
-    }
-    let guess = guess_among(&paths[0], &paths[1..], None).unwrap();
-    let import = Import::parse(&guess.description).unwrap_or_else(|e| panic!("{}: {e}", guess.description));
-    let reader = Reader::with_rest_length(0.2).import(Some(&import));
+    let Guessed { guess, import, paths, .. } = &guessed(files);
+    let reader = Reader::with_rest_length(0.2).import(Some(import));
     let recordings: Result<Vec<_>, _> = paths.iter().map(|path| reader.file(path)).collect();
-    (guess, recordings.map(|all| all.into_iter().flatten().collect()))
+    (guess.clone(), recordings.map(|all| all.into_iter().flatten().collect()))
 }
 
 /// Rows of a slow stroke: s, kPa, mm, N.

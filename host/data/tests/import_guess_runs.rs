@@ -1,11 +1,13 @@
 //! Import descriptions by guess, of recordings at held lengths: in files of their own, and one after the other in one file.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-use std::fmt::Write;
-use std::path::PathBuf;
+mod guessed;
 
+use std::fmt::Write;
+
+use guessed::{Guessed, guessed};
 use pam_data::recording::import_guess::{Guess, guess_among};
-use pam_data::recording::{Import, Reader, Recording};
+use pam_data::recording::{Reader, Recording};
 
 /// Rows of a pressure staircase at a held stroke in mm, with what else each row has.
 fn staircase(begin_s: i32, stroke_mm: f64, label: &str) -> String {
@@ -18,16 +20,9 @@ fn staircase(begin_s: i32, stroke_mm: f64, label: &str) -> String {
 }
 
 fn read(files: &[(&str, String)]) -> (Guess, Vec<Recording>) {
-    let folder = tempfile::tempdir().unwrap();
-    let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.path().join(name)).collect();
-    for (path, (_, text)) in paths.iter().zip(files) {
-        std::fs::write(path, text).unwrap();
-    }
-    let guessed = guess_among(&paths[0], &paths[1..], None).unwrap();
-    let import = Import::parse(&guessed.description).unwrap();
-    let reader = Reader::with_rest_length(0.2).import(Some(&import));
-    let recordings = paths.iter().flat_map(|path| reader.file(path).unwrap()).collect();
-    (guessed, recordings)
+    let Guessed { guess, import, paths, .. } = &guessed(files);
+    let reader = Reader::with_rest_length(0.2).import(Some(import));
+    (guess.clone(), paths.iter().flat_map(|path| reader.file(path).unwrap()).collect())
 }
 
 fn strokes_mm(recordings: &[Recording]) -> Vec<f64> {

@@ -1,11 +1,13 @@
 //! Import descriptions by guess: times in several columns, dates beside times of day, and clocks that disagree.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-use std::fmt::Write;
-use std::path::PathBuf;
+mod guessed;
 
+use std::fmt::Write;
+
+use guessed::{Guessed, guessed};
 use pam_data::recording::import_guess::{Guess, guess_among};
-use pam_data::recording::{Campaign, Import, Reader};
+use pam_data::recording::{Campaign, Reader};
 
 /// Rows of a slow stroke; `time` makes the first cells of a row from its time in s.
 fn rows(begin_s: f64, time: impl Fn(f64) -> String) -> String {
@@ -18,16 +20,9 @@ fn rows(begin_s: f64, time: impl Fn(f64) -> String) -> String {
 }
 
 fn read(files: &[(&str, String)]) -> (Guess, Campaign) {
-    let folder = tempfile::tempdir().unwrap();
-    let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.path().join(name)).collect();
-    for (path, (_, text)) in paths.iter().zip(files) {
-        std::fs::write(path, text).unwrap();
-    }
-    let guessed = guess_among(&paths[0], &paths[1..], None).unwrap();
-    let import = Import::parse(&guessed.description).unwrap();
-    let campaign = Reader::new().import(Some(&import)).campaign(&paths);
-    let campaign = campaign.unwrap_or_else(|e| panic!("{}: {e}", guessed.description));
-    (guessed, campaign)
+    let Guessed { guess, import, paths, .. } = &guessed(files);
+    let campaign = Reader::new().import(Some(import)).campaign(paths);
+    (guess.clone(), campaign.unwrap_or_else(|e| panic!("{}: {e}", guess.description)))
 }
 
 fn unknown(text: String) -> String {
