@@ -177,57 +177,84 @@ fn outcomes(dir: &Path) -> Result<Vec<Outcome>, Box<dyn Error>> {
         .collect()
 }
 
-fn loops(outcomes: &[Outcome]) -> Row {
-    let nulls = || outcomes.iter().filter(|o| matches!(o.stratum, Stratum::NullClean | Stratum::NullNasty));
-    let judged = || outcomes.iter().filter(|o| big_and_visible(o));
+/// What a trial adds to the counts.
+struct Trial {
+    /// Whether there is nothing to find.
+    null: bool,
+    /// Whether it is among those whose class is counted.
+    judged: bool,
+    class_right: bool,
+    exact: bool,
+    wrong_class: bool,
+    unanswered: bool,
+    named: Vec<String>,
+    /// What must stay the same for an answer that does not change.
+    answer: Vec<String>,
+}
+
+fn row(trials: &[Trial]) -> Row {
+    let count = |of: &dyn Fn(&Trial) -> bool| trials.iter().filter(|t| of(t)).count();
     Row {
-        false_alarms: nulls().filter(|o| !o.named.is_empty()).count(),
-        nulls: nulls().count(),
-        class_right: judged().filter(|o| o.class_right).count(),
-        exact: judged().filter(|o| o.exact).count(),
-        judged: judged().count(),
-        wrong_class: judged().filter(|o| !o.named.is_empty() && !o.class_right).count(),
-        unanswered: outcomes.iter().filter(|o| o.verdict.starts_with("failed")).count(),
-        named: outcomes.iter().map(|o| o.named.iter().map(|n| n.0.clone()).collect()).collect(),
+        false_alarms: count(&|t| t.null && !t.named.is_empty()),
+        nulls: count(&|t| t.null),
+        class_right: count(&|t| t.judged && t.class_right),
+        exact: count(&|t| t.judged && t.exact),
+        judged: count(&|t| t.judged),
+        wrong_class: count(&|t| t.judged && t.wrong_class),
+        unanswered: count(&|t| t.unanswered),
+        named: trials.iter().map(|t| t.answer.clone()).collect(),
         ..Row::default()
     }
 }
 
+fn loops(outcomes: &[Outcome]) -> Row {
+    let trial = |o: &Outcome| {
+        let named: Vec<String> = o.named.iter().map(|n| n.0.clone()).collect();
+        Trial {
+            null: matches!(o.stratum, Stratum::NullClean | Stratum::NullNasty),
+            judged: big_and_visible(o),
+            class_right: o.class_right,
+            exact: o.exact,
+            wrong_class: !named.is_empty() && !o.class_right,
+            unanswered: o.verdict.starts_with("failed"),
+            answer: named.clone(),
+            named,
+        }
+    };
+    row(&outcomes.iter().map(trial).collect::<Vec<_>>())
+}
+
 fn changes(outcomes: &[reference_bench::Outcome]) -> Row {
-    let nulls = || outcomes.iter().filter(|o| o.is_null());
-    let judged = || outcomes.iter().filter(|o| o.counts());
-    Row {
-        false_alarms: nulls().filter(|o| !o.named.is_empty()).count(),
-        nulls: nulls().count(),
-        class_right: judged().filter(|o| o.class_right()).count(),
-        exact: judged().filter(|o| o.exact()).count(),
-        judged: judged().count(),
-        wrong_class: judged().filter(|o| !o.named.is_empty() && !o.class_right()).count(),
-        unanswered: outcomes.iter().filter(|o| o.refused.is_some()).count(),
-        named: outcomes.iter().map(|o| o.named.iter().map(|n| n.0.clone()).collect()).collect(),
-        ..Row::default()
-    }
+    let trial = |o: &reference_bench::Outcome| {
+        let named: Vec<String> = o.named.iter().map(|n| n.0.clone()).collect();
+        Trial {
+            null: o.is_null(),
+            judged: o.counts(),
+            class_right: o.class_right(),
+            exact: o.exact(),
+            wrong_class: !named.is_empty() && !o.class_right(),
+            unanswered: o.refused.is_some(),
+            answer: named.clone(),
+            named,
+        }
+    };
+    row(&outcomes.iter().map(trial).collect::<Vec<_>>())
 }
 
 fn held_lengths(outcomes: &[held_length::Outcome]) -> Row {
     use held_length::Said;
-    let clean = || outcomes.iter().filter(|o| o.said.is_none());
-    let said =
-        |which: &[Said]| outcomes.iter().filter(|o| o.said.is_some_and(|s| which.contains(&s))).count();
-    let answer = |o: &held_length::Outcome| match o.named.as_slice() {
-        [] => vec![o.verdict.clone()],
-        some => some.to_vec(),
+    let trial = |o: &held_length::Outcome| Trial {
+        null: o.said.is_none(),
+        judged: o.said.is_some(),
+        class_right: matches!(o.said, Some(Said::Named | Said::InClassOrSet)),
+        exact: o.said == Some(Said::Named),
+        wrong_class: o.said == Some(Said::Wrong),
+        unanswered: false,
+        named: o.named.clone(),
+        // Without a name the verdict is the answer.
+        answer: if o.named.is_empty() { vec![o.verdict.clone()] } else { o.named.clone() },
     };
-    Row {
-        false_alarms: clean().filter(|o| !o.named.is_empty()).count(),
-        nulls: clean().count(),
-        class_right: said(&[Said::Named, Said::InClassOrSet]),
-        exact: said(&[Said::Named]),
-        judged: outcomes.iter().filter(|o| o.said.is_some()).count(),
-        wrong_class: said(&[Said::Wrong]),
-        named: outcomes.iter().map(answer).collect(),
-        ..Row::default()
-    }
+    row(&outcomes.iter().map(trial).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
