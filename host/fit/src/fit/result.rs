@@ -123,14 +123,19 @@ impl Fit {
 }
 
 /// The largest force of a muscle as a share of what its braid alone would make of the pressure; deadband and elasticity reduce it.
-pub(super) const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
+const SHARE_OF_BRAID: (f64, f64) = (0.2, 2.0);
 
 impl Solution {
+    /// The force as a share of what such a braid makes of the pressure, where no muscle has that share.
+    fn unusual_share(&self) -> Option<f64> {
+        self.problem.share_of_braid().filter(|s| !(SHARE_OF_BRAID.0..SHARE_OF_BRAID.1).contains(s))
+    }
+
     /// What is wrong where the force is not what such a braid makes of the pressure: units or dimensions. `None` where it is usual.
     #[must_use]
     pub fn unusual_share_of_braid(&self) -> Option<String> {
         let (least, most) = SHARE_OF_BRAID;
-        let share = self.problem.share_of_braid().filter(|s| !(least..most).contains(s))?;
+        let share = self.unusual_share()?;
         Some(format!(
             "the force is {share:.2} times what the described braid makes of the recorded pressure; {least} to {most} is usual: check the \
              units of force and pressure, and the muscle's dimensions"
@@ -144,8 +149,7 @@ impl Solution {
 /// [`FitCode::FitUnderdetermined`] where no usable table comes out.
 pub(super) fn table(solution: &Solution, muscle: &MuscleDescription) -> Result<MuscleTable> {
     let unusable = |what: &str| {
-        let share = solution.problem.share_of_braid();
-        let units = share.filter(|s| !(SHARE_OF_BRAID.0..SHARE_OF_BRAID.1).contains(s)).map(|s| {
+        let units = solution.unusual_share().map(|s| {
             let times = if s > 0.1 { format!("{s:.1} times") } else { format!("{s:.1e} times") };
             format!("the force is {times} what this braid makes of the recorded pressure: ")
         });
