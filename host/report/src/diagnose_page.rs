@@ -15,6 +15,7 @@ use super::wording;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 use pam_data::recording::Campaign;
 use pam_diagnose::history::is_from_history;
+use pam_diagnose::remark::Remark;
 use pam_diagnose::verdict::{Diagnosis, Missing, Verdict};
 use pam_fit::RecordingResidual;
 use pam_fit::bench::Candidate;
@@ -156,6 +157,12 @@ fn recommendation(d: &Diagnosis) -> Section {
     } else if d.missing.is_empty() {
         steps.push(
             "Use the table of `host fit`, with the error above. See below where the model is wrong."
+                .to_owned(),
+        );
+    }
+    if d.remarks.iter().any(|r| matches!(r, Remark::Dimensions(_))) {
+        steps.push(
+            "Measure the dimensions of the muscle first: other ones would leave nothing to explain."
                 .to_owned(),
         );
     }
