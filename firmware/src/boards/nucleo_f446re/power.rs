@@ -140,12 +140,17 @@ static SAGGED: AtomicBool = AtomicBool::new(false);
 
 /// Whether the supply is below now, or has been since this was last asked.
 pub fn supply_is_low() -> bool {
-    SAGGED.swap(false, Ordering::Relaxed) || PWR_CSR.read() & 1 << 2 != 0
+    SAGGED.swap(false, Ordering::Relaxed) || is_below()
 }
 
 /// Whether the supply is below now, or has been since the last tick: what a step commands that began before must not close the valve again.
 pub fn sags() -> bool {
-    SAGGED.load(Ordering::Relaxed) || PWR_CSR.read() & 1 << 2 != 0
+    SAGGED.load(Ordering::Relaxed) || is_below()
+}
+
+/// The output of the detector (PVDO).
+fn is_below() -> bool {
+    PWR_CSR.read() & 1 << 2 != 0
 }
 
 /// Above every critical section: it opens the valve and leaves the rest to the next tick.
