@@ -1,5 +1,6 @@
 //! The page of two recordings side by side: each quantity of both over time, its difference, and both as loops.
 
+use super::wording::capital;
 use super::{Axis, Colour, Figure, Page, Panel, Section, Table, Tone, fixed, significant};
 use pam_data::compare::{Column, Comparison};
 use pam_data::pluralise::pluralise;
@@ -178,11 +179,6 @@ fn symbol(name: &str) -> &'static str {
         "pressure" => "P",
         _ => "",
     }
-}
-
-fn capital(text: &str) -> String {
-    let mut characters = text.chars();
-    characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
 }
 
 /// Time after the start, s, and a quantity in the unit that it is compared in.

@@ -9,6 +9,7 @@ mod parameters;
 mod residuals;
 mod view;
 
+use super::wording::sentence;
 use super::{Page, Section, Table, Tone, fixed, significant};
 use pam_data::pluralise::pluralise;
 use pam_data::recording::Campaign;
@@ -174,7 +175,7 @@ fn remarks(view: &View<'_>) -> Section {
     let s = &view.fit.summary;
     let mut section = Section::new("Warnings and figures").summarised();
     for warning in &s.warnings {
-        section.notice(Tone::Caution, capital(warning));
+        section.notice(Tone::Caution, as_sentence(warning));
     }
     if let Some(free) = &s.physical {
         section.notice(
@@ -218,18 +219,10 @@ fn remarks(view: &View<'_>) -> Section {
     section
 }
 
-/// A sentence begins with a capital, wherever its words come from; symbols such as `k_F` stay.
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    match (chars.next(), text.chars().nth(1)) {
-        (Some(first), Some(second)) if second.is_alphabetic() || second == ' ' => {
-            let mut out: String = first.to_uppercase().collect();
-            out.push_str(chars.as_str());
-            if !out.ends_with(['.', '!', '?']) {
-                out.push('.');
-            }
-            out
-        }
+/// A sentence, wherever its words come from; one that begins with a symbol such as `k_F` stays.
+fn as_sentence(text: &str) -> String {
+    match text.chars().nth(1) {
+        Some(second) if second.is_alphabetic() || second == ' ' => sentence(text),
         _ => text.to_owned(),
     }
 }

@@ -39,8 +39,12 @@ pub(crate) fn list(names: &[String]) -> String {
 
 /// With a capital and a full stop.
 pub(crate) fn sentence(text: &str) -> String {
-    let mut characters = text.chars();
-    let capital =
-        characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect());
+    let capital = capital(text);
     if capital.ends_with(['.', '!', '?']) || capital.is_empty() { capital } else { capital + "." }
+}
+
+/// With a capital.
+pub(crate) fn capital(text: &str) -> String {
+    let mut characters = text.chars();
+    characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
 }
