@@ -1,19 +1,19 @@
 //! Import descriptions by guess: the same readings in forms of loggers and test machines, and pressures in names.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-mod guessed;
+mod described_files;
 
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use guessed::{Guessed, guessed};
+use described_files::{DescribedFiles, describe};
 use pam_data::error::Error;
 use pam_data::recording::import_guess::{Guess, guess_among};
 use pam_data::recording::{Reader, Recording};
 
 /// Reads files by the description that all of them give.
 fn read(files: &[(&str, Vec<u8>)]) -> (Guess, Result<Vec<Recording>, Error>) {
-    let Guessed { guess, import, paths, .. } = &guessed(files);
+    let DescribedFiles { guess, import, paths, .. } = &describe(files);
     let reader = Reader::with_rest_length(0.2).import(Some(import));
     let recordings: Result<Vec<_>, _> = paths.iter().map(|path| reader.file(path)).collect();
     (guess.clone(), recordings.map(|all| all.into_iter().flatten().collect()))

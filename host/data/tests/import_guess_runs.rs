@@ -1,11 +1,11 @@
 //! Import descriptions by guess, of recordings at held lengths: in files of their own, and one after the other in one file.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-mod guessed;
+mod described_files;
 
 use std::fmt::Write;
 
-use guessed::{Guessed, guessed};
+use described_files::{DescribedFiles, describe};
 use pam_data::recording::import_guess::{Guess, guess_among};
 use pam_data::recording::{Reader, Recording};
 
@@ -20,7 +20,7 @@ fn staircase(begin_s: i32, stroke_mm: f64, label: &str) -> String {
 }
 
 fn read(files: &[(&str, String)]) -> (Guess, Vec<Recording>) {
-    let Guessed { guess, import, paths, .. } = &guessed(files);
+    let DescribedFiles { guess, import, paths, .. } = &describe(files);
     let reader = Reader::with_rest_length(0.2).import(Some(import));
     (guess.clone(), paths.iter().flat_map(|path| reader.file(path).unwrap()).collect())
 }

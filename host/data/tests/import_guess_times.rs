@@ -1,11 +1,11 @@
 //! Import descriptions by guess: times in several columns, dates beside times of day, and clocks that disagree.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
-mod guessed;
+mod described_files;
 
 use std::fmt::Write;
 
-use guessed::{Guessed, guessed};
+use described_files::{DescribedFiles, describe};
 use pam_data::recording::import_guess::{Guess, guess_among};
 use pam_data::recording::{Campaign, Reader};
 
@@ -20,7 +20,7 @@ fn rows(begin_s: f64, time: impl Fn(f64) -> String) -> String {
 }
 
 fn read(files: &[(&str, String)]) -> (Guess, Campaign) {
-    let Guessed { guess, import, paths, .. } = &guessed(files);
+    let DescribedFiles { guess, import, paths, .. } = &describe(files);
     let campaign = Reader::new().import(Some(import)).campaign(paths);
     (guess.clone(), campaign.unwrap_or_else(|e| panic!("{}: {e}", guess.description)))
 }

@@ -1,4 +1,4 @@
-//! Files of a bench with the import description that a guess writes for them.
+//! Files of a bench with the import description that `guess_among` writes for them.
 #![allow(clippy::unwrap_used)] // what fails here fails the test
 
 use std::path::PathBuf;
@@ -8,16 +8,16 @@ use pam_data::recording::import_guess::{Guess, guess_among};
 use tempfile::TempDir;
 
 /// Files in a folder, which goes with this value.
-pub struct Guessed {
+pub struct DescribedFiles {
     pub guess: Guess,
-    /// The description that was guessed.
+    /// The description, as a reader takes it.
     pub import: Import,
     pub paths: Vec<PathBuf>,
     _folder: TempDir,
 }
 
-/// Writes files of these names and guesses one description for all of them, from the first.
-pub fn guessed(files: &[(&str, impl AsRef<[u8]>)]) -> Guessed {
+/// Writes files of these names and lets one description be found for all of them, from the first.
+pub fn describe(files: &[(&str, impl AsRef<[u8]>)]) -> DescribedFiles {
     let folder = tempfile::tempdir().unwrap();
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.path().join(name)).collect();
     for (path, (_, bytes)) in paths.iter().zip(files) {
@@ -25,5 +25,5 @@ pub fn guessed(files: &[(&str, impl AsRef<[u8]>)]) -> Guessed {
     }
     let guess = guess_among(&paths[0], &paths[1..], None).unwrap();
     let import = Import::parse(&guess.description).unwrap_or_else(|e| panic!("{}: {e}", guess.description));
-    Guessed { guess, import, paths, _folder: folder }
+    DescribedFiles { guess, import, paths, _folder: folder }
 }
