@@ -12,8 +12,9 @@ from link import (
     Refused, frame, varint,
 )
 
-# The most instructions of a control tick, all of its interrupts together, in force control with a table.
-MOST_INSTRUCTIONS = 2500
+# The most instructions of a control tick, all of its interrupts together, in force control with a table: 2,477 measured, of 180,000 cycles
+# between two ticks.
+MOST_INSTRUCTIONS = 2700
 
 
 class Boot(unittest.TestCase):
