@@ -33,6 +33,7 @@ use pam_data::recording::motion;
 
 pub(crate) mod baseline;
 pub(crate) mod candidates;
+pub(crate) mod filtered_channels;
 pub(crate) mod history;
 pub(crate) mod judgement;
 pub(crate) mod location;
@@ -55,11 +56,12 @@ pub fn lack_of_fit() -> f64 {
 }
 
 /// The whole page, stage by stage in the order in which they decide.
-pub const PAGE: [Stage; 17] = [
+pub const PAGE: [Stage; 18] = [
     motion::CRITERIA,
     valve_pulses::STAGE,
     rows::STAGE,
     baseline::STAGE,
+    filtered_channels::STAGE,
     rest_friction::STAGE,
     noise::STAGE,
     candidates::STAGE,

@@ -14,6 +14,7 @@ use super::criteria::judgement::{
 };
 use super::criteria::rows::{NO_LOAD, SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
+use super::filtered_channels;
 use super::findings::{considered, missing};
 use super::known_effects;
 use super::linear::energy;
@@ -125,7 +126,9 @@ fn settle(
     remarks: &mut Vec<Remark>,
 ) -> Result<Settled, Unjudgeable> {
     let screened = screen(rows, blocked, pushed, remarks)?;
-    let (ramps, turning) = rest_friction::settle_ramps(&screened);
+    let (unmixed, filter) = filtered_channels::settle(&screened);
+    let (ramps, turning) = rest_friction::settle_ramps(&unmixed);
+    remarks.extend(filter.map(|over| Remark::FilteredChannels { over }));
     remarks.extend(turning.map(|law| Remark::FrictionTurns { over: law.most_done() }));
     let (rows, law) = rest_friction::settle_rest_friction(&ramps);
     remarks.extend(law.map(|law| Remark::FrictionAtRest(law.into())));

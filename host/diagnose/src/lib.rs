@@ -48,6 +48,7 @@ mod cross_validation;
 mod description;
 mod diagnosis;
 pub mod experiment;
+mod filtered_channels;
 mod findings;
 mod forward_selection;
 mod free_zero;

@@ -132,6 +132,11 @@ pub enum Remark {
         /// Change of pressure over which it turns by 63 %, Pa.
         over: f64,
     },
+    /// All channels passed a low-pass filter; rows about reversals, in which it mixes both directions of friction, are excluded.
+    FilteredChannels {
+        /// Time over which friction turns in the recordings, s.
+        over: f64,
+    },
     /// Readings at the end of the force sensor's range, excluded.
     SensorEnd {
         /// Number of such readings.

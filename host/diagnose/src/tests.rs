@@ -3,6 +3,7 @@
 //! The force comes from a table muscle, friction and faults from plain formulas below, not from the library of effects.
 
 pub(crate) mod added;
+mod filtered;
 mod held_length;
 mod plays;
 mod ramps;

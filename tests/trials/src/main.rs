@@ -24,6 +24,7 @@ mod martens;
 mod names;
 mod oracle;
 mod paired_test;
+mod processed;
 mod progress;
 mod proof_page;
 mod queue;
@@ -223,6 +224,8 @@ enum Command {
     Ablation(sensitivity::ablation::Ablation),
     /// Spoil one recording of clean campaigns in every way that sensors and loggers fail, and count what is found.
     Sensors(sensors::Sensors),
+    /// Diagnose clean recordings that were filtered, thinned, rounded or made noisy, and count false alarms.
+    Processed(processed::Processed),
     /// Diagnose muscles of the virtual bench whose length was held, clean ones and with one effect.
     Held(held_length::Held),
     /// Diagnose changes: changes added to later runs of real recordings, untouched pairs, a cylinder whose seal was replaced.
@@ -295,6 +298,7 @@ fn main() -> ExitCode {
         Command::Sensitivity(study) => sensitivity::run(&study),
         Command::Ablation(ablation) => sensitivity::ablation::run(&ablation),
         Command::Sensors(what) => sensors::run(&what),
+        Command::Processed(what) => processed::run(&what),
         Command::Held(what) => held_length::run(&what),
         Command::Reference(what) => reference::run(&what),
         Command::ReferenceFurther(what) => reference::further::run(&what),

@@ -1,5 +1,7 @@
 //! Amplitudes with signs, from products of few columns.
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::criteria::candidates::MOST_AMPLITUDES;
 
 /// Which signs an amplitude may have.
@@ -46,35 +48,12 @@ pub(crate) fn solve_symmetric(gram: &[Vec<f64>], moment: &[f64], chosen: &[usize
     if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
         return None;
     }
-    let mut l = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        for j in 0..=i {
-            let mut v = gram[chosen[i]][chosen[j]] / (scale[i] * scale[j]);
-            for k in 0..j {
-                v -= l[i][k] * l[j][k];
-            }
-            if i == j {
-                if v <= 1e-10 {
-                    return None;
-                }
-                l[i][i] = v.sqrt();
-            } else {
-                l[i][j] = v / l[j][j];
-            }
-        }
+    let unit = DMatrix::from_fn(n, n, |i, j| gram[chosen[i]][chosen[j]] / (scale[i] * scale[j]));
+    let factor = unit.cholesky()?;
+    // The squared pivot is the part of a column that the ones before do not span.
+    if factor.l_dirty().diagonal().iter().any(|root| root * root <= 1e-10) {
+        return None;
     }
-    let mut x: Vec<f64> = chosen.iter().zip(&scale).map(|(i, s)| moment[*i] / s).collect();
-    for i in 0..n {
-        for k in 0..i {
-            x[i] -= l[i][k] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
-    for i in (0..n).rev() {
-        for k in i + 1..n {
-            x[i] -= l[k][i] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
-    Some(x.iter().zip(&scale).map(|(v, s)| v / s).collect())
+    let solved = factor.solve(&DVector::from_fn(n, |i, _| moment[chosen[i]] / scale[i]));
+    Some(solved.iter().zip(&scale).map(|(x, s)| x / s).collect())
 }

@@ -171,7 +171,8 @@ impl Gathering<'_> {
         let moved = Moved { samples: &samples, state: &state, ringing: &ringing };
         let spike = readings::spikes(force);
         let pressure = smoothed_pressure(&recording.pressure, force, self.pull(&recording.stroke));
-        let stroke = smoothed_stroke(&recording.stroke);
+        let turns = motion.reversals.iter().filter(|t| t.cause == Cause::Stroke);
+        let stroke = smoothed_stroke(&recording.stroke, &turns.map(|t| t.index).collect::<Vec<_>>());
         let readings = Readings { pressure: &pressure, stroke: &stroke, force, spike: &spike, read };
         let mut previous: Option<f64> = None;
         let mut piece = None;

@@ -9,12 +9,13 @@ use pam_data::recording::white_noise;
 
 /// Pressures without the part of their scatter that the force does not follow. `pull` is the force per pressure, m².
 pub(super) fn smoothed_pressure(pressure: &[f64], force: &[f64], pull: f64) -> Vec<f64> {
-    smooth(pressure, white_noise(pressure), share_felt(pressure, force, pull))
+    smooth(pressure, white_noise(pressure), share_felt(pressure, force, pull), &[])
 }
 
-/// Strokes without the scatter of their sensor. No muscle moves back and forth from reading to reading.
-pub(super) fn smoothed_stroke(stroke: &[f64]) -> Vec<f64> {
-    smooth(stroke, white_noise(stroke), 0.0)
+/// Strokes without the scatter of their sensor. No muscle moves back and forth from reading to reading. Across a reversal nothing is
+/// averaged: a rounded corner would look like a force that comes late.
+pub(super) fn smoothed_stroke(stroke: &[f64], reversals: &[usize]) -> Vec<f64> {
+    smooth(stroke, white_noise(stroke), 0.0, reversals)
 }
 
 /// The share of the pressure's fast scatter that the muscle feels: where the regulator makes it, the force follows; where the sensor makes
@@ -34,22 +35,29 @@ fn share_felt(pressure: &[f64], force: &[f64], pull: f64) -> f64 {
 /// A series with white scatter of this standard deviation, without the share of it that is not `felt`: each value moves to the mean of its
 /// neighbours, which is that of a line through them, where the scatter about the line is that of the noise. Of several windows the widest
 /// counts for which this is so; where the series changes faster than a line in the narrowest, it stays the more, the larger the scatter
-/// (J. S. Lee, IEEE Trans. Pattern Anal. Mach. Intell. 2 (1980) 165–168, with a line in place of a constant). It delays nothing.
-fn smooth(series: &[f64], scatter: f64, felt: f64) -> Vec<f64> {
+/// (J. S. Lee, IEEE Trans. Pattern Anal. Mach. Intell. 2 (1980) 165–168, with a line in place of a constant). It delays nothing. No window
+/// reaches across a reversal, which is given by its first value; windows near one are narrower.
+fn smooth(series: &[f64], scatter: f64, felt: f64, reversals: &[usize]) -> Vec<f64> {
     let mut smoothed = series.to_vec();
     if !(scatter > 0.0) {
         return smoothed;
     }
-    let limits = SMOOTHED.map(|n| scatter * scatter * chi_squared_over_degrees(n as f64 - 2.0));
+    let limit = |half: usize| scatter * scatter * chi_squared_over_degrees((2 * half + 1) as f64 - 2.0);
+    let usual = SMOOTHED.map(|n| (n / 2, limit(n / 2)));
+    let near: Vec<f64> = (0..SMOOTHED[SMOOTHED.len() - 1] / 2).map(|half| limit(half.max(1))).collect();
+    let mut legs = reversals.iter().copied().chain([series.len()]).peekable();
+    let mut leg = 0..0;
     for (i, value) in smoothed.iter_mut().enumerate() {
-        for (n, limit) in SMOOTHED.into_iter().zip(limits) {
-            let half = n / 2;
-            let Some(window) = i.checked_sub(half).and_then(|from| series.get(from..=i + half)) else {
-                continue;
-            };
-            let (mean, variance) = about_line(window);
-            let narrowest = n == SMOOTHED[SMOOTHED.len() - 1];
-            if variance <= limit || narrowest {
+        while let Some(end) = legs.next_if(|_| leg.end <= i) {
+            leg = leg.end..end;
+        }
+        let room = (i - leg.start).min(leg.end - 1 - i);
+        let narrow = near.get(room).filter(|_| room > 0).map(|limit| (room, *limit));
+        let windows = || usual.into_iter().filter(|(half, _)| *half <= room).chain(narrow);
+        let narrowest = windows().last().map_or(0, |(half, _)| half);
+        for (half, limit) in windows() {
+            let (mean, variance) = about_line(&series[i - half..=i + half]);
+            if variance <= limit || half == narrowest {
                 let removed = (1.0 - felt) * (limit / variance).min(1.0);
                 *value -= removed * (*value - mean);
                 break;
@@ -127,8 +135,25 @@ mod tests {
             _ => 150e3,
         };
         let read: Vec<f64> = (0..2000).map(|i| pressure(i) + 400.0 * noise(i)).collect();
-        let smooth = smooth(&read, white_noise(&read), 0.0);
+        let smooth = smooth(&read, white_noise(&read), 0.0, &[]);
         assert!(smooth.iter().enumerate().all(|(i, p)| (p - pressure(i)).abs() < 400.0), "{smooth:?}");
+    }
+
+    /// Slow strokes, of which a row is no more than the noise: the corners of all reversals together show what smoothing takes away.
+    #[test]
+    fn the_corner_of_a_reversal_is_not_rounded() {
+        let stroke = |i: usize| 1e-5 * (i % 200).min(200 - i % 200) as f64;
+        let read: Vec<f64> = (0..20_000).map(|i| stroke(i) + 6e-5 * noise(i)).collect();
+        let tops: Vec<usize> = (0..100).map(|k| 200 * k + 100).collect();
+        let rounded = |smooth: &[f64]| tops.iter().map(|i| stroke(*i) - smooth[*i]).sum::<f64>() / 100.0;
+        let reversals: Vec<usize> = (1..200).map(|k| 100 * k + 1).collect();
+        let (across, within) = (smoothed_stroke(&read, &[]), smoothed_stroke(&read, &reversals));
+        assert!(rounded(&across) > 1e-5, "{}", rounded(&across));
+        assert!(rounded(&within).abs() < 4e-6, "{}", rounded(&within));
+        // Elsewhere it is as smooth as before.
+        let middle =
+            |series: &[f64]| (0..100).map(|k| (series[200 * k + 50] - stroke(50)).abs()).sum::<f64>();
+        assert_eq!(middle(&within), middle(&across));
     }
 
     #[test]

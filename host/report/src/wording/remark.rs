@@ -40,6 +40,11 @@ pub fn remark(remark: &Remark) -> String {
              rows of a pressure ramp are excluded while it turns",
             over * 1e-3
         ),
+        Remark::FilteredChannels { over } => format!(
+            "the recordings are filtered: force and displacement pass through a reversal of the motion over {over:.2} s, and the force begins \
+             before the displacement turns. These rows are excluded, so that friction that turns slowly is not identifiable. Record without \
+             the filter, or with a higher cut-off frequency"
+        ),
         Remark::SensorEnd { rows, force } => format!(
             "{} of exactly {force:.2} N excluded: end of the force sensor's range",
             pluralise(*rows, "reading")
