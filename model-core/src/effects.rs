@@ -43,7 +43,7 @@
 //! ```
 //!
 //! Adding an effect: write its file, and add it to the list below. The file holds the equations, what they mean ([`Info`]) and what a
-//! diagnosis has to know ([`Traits`]).
+//! diagnosis has to know ([`Traits`]), with how a change of the effect shows between two campaigns ([`Changed`]).
 
 use crate::fields::{Fields, Walk, fields};
 use crate::scalar::Scalar;
@@ -85,7 +85,7 @@ mod tip_effect;
 mod viscous_damping;
 
 pub use chain::Chain;
-pub use change::{Changed, Class, Owner};
+pub use change::{Changed, Class, Course, ForceShape, FurtherLaw, Inspect, Owner};
 pub use context::Context;
 pub use fading::{Fading, decay};
 pub use traits::{BenchCheck, Experiment, Imitates, Traits, Vented};

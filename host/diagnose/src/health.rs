@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::criteria::table_health::{
     DISTINCT_CHANGES, HEALTH_CORRELATION, HEALTH_DISTINCT, HEALTH_PAIRS, HEALTH_SHOWN, SECOND_CHANGE,
 };
-use crate::reference::shapes::Change;
+use crate::reference::shapes::{Change, ForceShape};
 use pam_data::statistics::NORMAL_95;
 
 /// What is known of the table.
@@ -61,31 +61,34 @@ pub struct Assessment {
     pub findings: Vec<Finding>,
 }
 
-/// Which change a shape is of, the size of a coefficient of one, and its unit.
-fn meaning(shape: Shape, sums: &HealthSums) -> (Change, f64) {
+/// Which change a shape of the sums is of, and the size of a coefficient of one; `None` for a shape that no effect has.
+fn meaning(shape: Shape, sums: &HealthSums) -> Option<(Change, f64)> {
     let (force, pressure, stroke) =
         (f64::from(sums.force_n), f64::from(sums.pressure_pa), f64::from(sums.stroke_m));
     let window_h = f64::from(sums.window_blocks) * f64::from(sums.block_ticks) * 1e-3 / 3600.0;
-    match shape {
-        Shape::ForceOffset => (Change::ForceOffset, force),
-        Shape::ForceGain => (Change::ForceGain, 1.0),
-        Shape::PressureGain => (Change::GaugeGain, -1.0),
-        Shape::CrossTalk => (Change::CrossTalk, force / pressure),
-        Shape::PressureOffset => (Change::GaugeOffset, -pressure),
-        Shape::Length => (Change::DisplacementOffset, stroke),
-        Shape::Compliance => (Change::RigCompliance, stroke / force),
-        Shape::Friction => (Change::CoulombFriction, -force),
-        Shape::Lag => (Change::SensorDelay, -1.0),
-        Shape::Drift => (Change::ForceDrift, force / window_h),
-    }
+    let (of_force, unit) = match shape {
+        Shape::ForceOffset => (ForceShape::Constant, force),
+        Shape::ForceGain => (ForceShape::Force, 1.0),
+        Shape::PressureGain => (ForceShape::PressureTimesSlope, 1.0),
+        Shape::CrossTalk => (ForceShape::Pressure, force / pressure),
+        Shape::PressureOffset => (ForceShape::PressureSlope, pressure),
+        Shape::Length => (ForceShape::StrokeSlope, stroke),
+        Shape::Compliance => (ForceShape::ForceTimesStrokeSlope, stroke / force),
+        Shape::Friction => (ForceShape::Direction, force),
+        // A late force lacks dF/dt times its delay.
+        Shape::Lag => (ForceShape::LateForce, -1.0),
+        Shape::Drift => (ForceShape::Time, force / window_h),
+    };
+    let change = Change::of_shape(of_force)?;
+    Some((change, change.sign() * unit))
 }
 
 /// The unit of a finding's size.
 #[must_use]
 pub fn unit(change: Change) -> &'static str {
-    match change {
-        Change::ForceDrift => "N/h",
-        other => other.about().changed.size.1,
+    match change.shape() {
+        Some(ForceShape::Time) => "N/h",
+        _ => change.about().changed.size.1,
     }
 }
 
@@ -192,26 +195,26 @@ impl<'a> Equations<'a> {
         }
         let Some((beta, covariance, left)) = self.fit(&chosen) else { return Vec::new() };
         let variance = left / self.weight * inflation;
-        let name = |shape: usize| meaning(Shape::ALL[shape], self.sums).0;
+        let change_of = |shape: &usize| meaning(Shape::ALL[*shape], self.sums).map(|m| m.0);
         chosen
             .iter()
             .enumerate()
-            .map(|(at, shape)| {
-                let (change, scale) = meaning(Shape::ALL[*shape], self.sums);
+            .filter_map(|(at, shape)| {
+                let (change, scale) = meaning(Shape::ALL[*shape], self.sums)?;
                 let (size, half) =
                     (scale * beta[at], NORMAL_95 * scale.abs() * (variance * covariance[(at, at)]).sqrt());
                 let energy = beta[at] * beta[at] * self.matrix[(*shape, *shape)];
-                Finding {
+                Some(Finding {
                     change,
                     size,
                     interval: (size - half, size + half),
                     share: (energy / self.residual()).min(1.0),
                     confusable_with: if at == 0 {
-                        confusable.iter().map(|k| name(*k)).collect()
+                        confusable.iter().filter_map(change_of).collect()
                     } else {
                         Vec::new()
                     },
-                }
+                })
             })
             .collect()
     }

@@ -9,8 +9,8 @@
 //! muscle first moves `s` is unknown and nothing is added.
 
 use super::{
-    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits, Vented,
-    stroke_direction,
+    Changed, Class, Context, Effect, Experiment, ForceShape, Info, Inspect, Link, Memory, Owner, Parameter,
+    Start, Traits, Vented, stroke_direction,
 };
 use crate::scalar::Scalar;
 
@@ -35,9 +35,12 @@ impl Effect for CoulombFriction {
         source: "C.-P. Chou and B. Hannaford, IEEE Trans. Robotics and Automation 12 (1996) 90–102, doi 10.1109/70.481753",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps)
-        .vented(Vented::FirstLaw)
-        .changed(Changed::new(Class::Friction, Owner::RigOrMuscle, "ΔF = −f·sgn v").sized("force", "N"));
+    const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).vented(Vented::FirstLaw).changed(
+        Changed::new(Class::Friction, Owner::RigOrMuscle, "ΔF = −f·sgn v")
+            .sized("force", "N")
+            .takes(ForceShape::Direction)
+            .inspect(Inspect::Guides),
+    );
 
     fn step<T: Scalar>(_parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: the direction of the stroke

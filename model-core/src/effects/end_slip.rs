@@ -7,8 +7,8 @@
 //! time zero is there from the first reading; once seen it stays (the memory is kept over a power cycle). First order in `δ`.
 
 use super::{
-    Axis, BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter,
-    Start, Traits,
+    Axis, BenchCheck, Changed, Class, Context, Course, Effect, Experiment, ForceShape, Info, Inspect, Link,
+    Memory, Owner, Parameter, Start, Traits,
 };
 use crate::scalar::Scalar;
 
@@ -36,7 +36,10 @@ impl Effect for EndSlip {
     const TRAITS: Traits =
         Traits::shown_by(Experiment::VentedLength).check(BenchCheck::VentedLength).changed(
             Changed::new(Class::EndSlip, Owner::RigOrMuscle, "ΔF = δ·∂F/∂x from one moment on")
-                .sized("slip", "m"),
+                .sized("slip", "m")
+                .adds(ForceShape::StrokeStep)
+                .courses(&[Course::Step])
+                .inspect(Inspect::EndFittings),
         );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {

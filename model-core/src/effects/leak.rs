@@ -5,8 +5,8 @@
 //! missing. From force alone it cannot be reported from a wrong gain of the gauge: close the valve for a minute and watch.
 
 use super::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
-    Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Inspect, Link, Memory, Owner, Parameter,
+    Start, Traits,
 };
 use crate::scalar::Scalar;
 
@@ -28,14 +28,15 @@ impl Effect for Leak {
         source: "continuity of laminar flow through line and leak in series; leak-down recordings of Festo muscles lose 5 to 480 kPa in two minutes",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::ClosedValve)
-        .check(BenchCheck::ClosedValve)
-        .loses_air()
-        .changed(Changed::new(
-            Class::Gain,
-            Owner::RigOrMuscle,
-            "air lost on the way costs pressure; behind closed valves dP/dt = −λ·P",
-        ));
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::ClosedValve).check(BenchCheck::ClosedValve).loses_air().changed(
+            Changed::new(
+                Class::Gain,
+                Owner::RigOrMuscle,
+                "air lost on the way costs pressure; behind closed valves dP/dt = −λ·P",
+            )
+            .inspect(Inspect::Leaks),
+        );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         -context.pull_per_pressure() * parameters[0] * context.pressure

@@ -7,7 +7,8 @@
 //! overstates friction.
 
 use super::{
-    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+    Changed, Class, Context, Effect, Experiment, ForceShape, Info, Inspect, Link, Memory, Owner, Parameter,
+    Start, Traits,
 };
 use crate::scalar::Scalar;
 
@@ -34,7 +35,9 @@ impl Effect for PressureFriction {
 
     const TRAITS: Traits = Traits::shown_by(Experiment::PressuresAndRamps).changed(
         Changed::new(Class::Friction, Owner::RigOrMuscle, "ΔF = −μ·P·sgn v")
-            .sized("force_per_pressure", "m²"),
+            .sized("force_per_pressure", "m²")
+            .takes(ForceShape::DirectionTimesPressure)
+            .inspect(Inspect::SealOrBraid),
     );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

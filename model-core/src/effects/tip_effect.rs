@@ -11,8 +11,8 @@
 //! whole; they show as `E_k` that rise in proportion to pressure.
 
 use super::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter,
-    Start, Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, FurtherLaw, Imitates, Info, Link, Memory, Owner,
+    Parameter, Start, Traits,
 };
 use crate::scalar::Scalar;
 
@@ -40,7 +40,10 @@ impl Effect for TipEffect {
     const TRAITS: Traits = Traits::shown_by(Experiment::EndsAndDiameter)
         .check(BenchCheck::EndsAndDiameter)
         .imitates(Imitates::Description)
-        .changed(Changed::new(Class::Alone(Self::INFO.name), Owner::Muscle, "the ends are not cylinders"));
+        .changed(
+            Changed::new(Class::Alone(Self::INFO.name), Owner::Muscle, "the ends are not cylinders")
+                .further(FurtherLaw::TaperSlant),
+        );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let cross_section = T::from_f64(core::f64::consts::PI) * context.radius * context.radius;

@@ -20,7 +20,7 @@ use super::criteria::{
 };
 use super::detectable;
 use super::runs::{Run, Runs};
-use super::shapes::{CHANGES, Change};
+use super::shapes::Change;
 use pam_data::recording::motion;
 use pam_data::statistics::{deviation_from_median, median};
 use pam_fit::bench::Candidate;
@@ -181,12 +181,11 @@ fn unseen(contrasts: &[(f64, f64)]) -> f64 {
     (1.0 - left.sum::<f64>() / energy.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
-/// Adds to the answer what closed valves lose. `none`: prior probability of no change.
-pub(super) fn add(report: &mut ChangeReport, loss: &Loss, none: f64) {
-    let loses = Candidate::all().find(|c| c.traits().loses_air);
-    let Some(change) = loses.and_then(|c| Change::from_name(c.name())) else { return };
+/// Adds to the answer what closed valves lose. `names`: how many other changes are tested; `none`: prior probability of no change.
+pub(super) fn add(report: &mut ChangeReport, loss: &Loss, names: usize, none: f64) {
+    let Some(change) = Candidate::all().find(|c| c.traits().loses_air).map(Change::Effect) else { return };
     // A leak has the prior probability of any other name, and is independent of what the forces show.
-    let prior = (1.0 - none - PRIOR_UNKNOWN.min(1.0 - none)) / (CHANGES.len() + 1) as f64;
+    let prior = (1.0 - none - PRIOR_UNKNOWN.min(1.0 - none)) / (names + 1) as f64;
     let odds = prior / (1.0 - prior) * loss.log.exp();
     let probability = if odds.is_finite() { odds / (1.0 + odds) } else { 1.0 };
     let unchanged = report.probability("none");

@@ -1,12 +1,10 @@
 //! What the answer means for a table: a correction of the bench beside it, the change applied to it, or a refit on AFTER.
 
 use super::answer::{ChangeReport, Changed, Verdict};
-use super::shapes::Change;
 use super::updated;
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::recording::Campaign;
-use pam_fit::bench::Candidate;
 use pam_fit::predict::predict;
 use pam_fit::table_file::{About, Correction, TableFile};
 use pam_fit::{Options as FitOptions, fit};
@@ -40,26 +38,14 @@ pub fn fitted(campaign: &Campaign, muscle: &MuscleDescription) -> Result<TableFi
     Ok(TableFile { table: fitted.table, about })
 }
 
-/// The correction of a change of the bench, in the catalogue's parameters; `None` where the catalogue has no such law.
+/// The correction of a change of the bench, in the catalogue's parameters; `None` where its size does not correct later readings.
 fn correction(changed: &Changed) -> Option<Correction> {
-    let change = Change::from_name(&changed.effect)?;
+    let change = changed.change;
+    let effect = change.effect().filter(|e| e.is_bench() && change.about().changed.correctable)?;
     let size = changed.parameters.first()?.value;
-    let Some(Candidate::Bench(_)) = Candidate::from_name(&changed.effect) else { return None };
-    let info = Candidate::from_name(&changed.effect)?.info();
-    let mut parameters = vec![0.0; info.parameters.len()];
-    match change {
-        // The catalogue counts the pressure that the reading lacks.
-        Change::GaugeGain | Change::GaugeOffset => parameters[0] = -size,
-        // A reading that is late by a first-order filter adds to the force expected of it.
-        Change::ForceOffset
-        | Change::ForceGain
-        | Change::CrossTalk
-        | Change::DisplacementOffset
-        | Change::SensorDelay
-        | Change::PressureSensorLag => parameters[0] = size,
-        // A drift over one campaign does not show that of the next, and a frame's law has a part at turns that was not measured.
-        _ => return None,
-    }
+    let mut parameters = vec![0.0; effect.info().parameters.len()];
+    // The catalogue counts the pressure that a gauge lacks, a change what it reads too much.
+    *parameters.first_mut()? = change.sign() * size;
     Some(Correction { effect: changed.effect.clone(), parameters })
 }
 

@@ -10,6 +10,7 @@ use super::naming::{self, Accepted};
 use super::posterior::Posterior;
 use super::repeatability::{Setting, covariance};
 use super::runs::Runs;
+use super::shapes::Change;
 use super::surface::Surface;
 use super::table_error;
 use super::weighing::{Inexact, Round, Weighing, weigh};
@@ -26,6 +27,8 @@ pub(super) struct Analysis {
     pub accepted: Vec<Accepted>,
     /// The weighing after the last name.
     pub last: Posterior,
+    /// The changes that were tested, in order.
+    pub tested: Vec<Change>,
     /// Whether the reference is recordings, and no table.
     pub recorded: bool,
     /// The likeliest error of a table in a cell, N; zero for recordings.
@@ -50,11 +53,16 @@ pub(super) struct Reference {
     pub recorded: bool,
 }
 
-/// Weighs everything.
+/// Weighs everything. `tested`: the changes that are tested, in order.
 ///
 /// # Errors
 /// Recordings that leave no common cells, or numbers that cannot be used.
-pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Result<Analysis> {
+pub(super) fn analyse(
+    runs: Runs,
+    reference: Reference,
+    tested: Vec<Change>,
+    prior_none: f64,
+) -> Result<Analysis> {
     let Reference { surface, error, recorded } = reference;
     // Rows of one part of a motion do not follow one another: they do not show lags.
     // A table is often older: a filter of some seconds may have been added since.
@@ -82,14 +90,21 @@ pub(super) fn analyse(runs: Runs, reference: Reference, prior_none: f64) -> Resu
     let contrasts = contrasts(&cells, &runs, &setting, (!recorded).then_some(error))?;
     // Beside rests the first name is tested as it is: no other one is left by it.
     let inexact = Inexact { share: if runs.moving { COMBINED_SHAPE_ERROR } else { 0.0 }, first: 0.0 };
-    let by = Weighing { surface: &surface, lag: shift.as_ref(), inexact, moving: runs.moving, prior_none };
+    let by = Weighing {
+        surface: &surface,
+        tested: &tested,
+        lag: shift.as_ref(),
+        inexact,
+        moving: runs.moving,
+        prior_none,
+    };
     let weighed = |c: Contrast| (weigh(&cells, &c, by), c);
     let (first, contrast, which) = likeliest(contrasts.into_iter().map(weighed).collect())?;
     let reference_error = if recorded { 0.0 } else { error * TABLE_ERROR_FACTORS[which] };
     let about = naming::About { runs: &runs, lags_first: tried, by };
     let named = naming::name(&about, &contrast, (&cells, &first));
     let naming::NamedChanges { cells, accepted, last } = named;
-    Ok(Analysis { runs, surface, cells, contrast, first, accepted, last, recorded, reference_error })
+    Ok(Analysis { runs, surface, cells, contrast, first, accepted, last, tested, recorded, reference_error })
 }
 
 /// Generalised least squares for every error that the reference may have; one, without an error, for recordings.

@@ -7,7 +7,7 @@ use super::cells::Cell;
 use super::criteria::{CELLS, LOCALISE_STANDS_OUT};
 use super::isometric::Analysis;
 use super::naming::Accepted;
-use super::time_course::Kind;
+use super::shapes::Course;
 
 /// Shares of the energy by mounting, pressure, direction and recording, those that stand out.
 pub(super) fn places(analysis: &Analysis, difference: &DVector<f64>, rest_length: Option<f64>) -> Vec<Place> {
@@ -78,8 +78,8 @@ pub(super) fn since(analysis: &Analysis, accepted: &Accepted) -> Since {
         high: seconds(time_course.start.high),
     };
     match time_course.kind {
-        Kind::Whole => Since::Beginning,
-        Kind::Step => Since::From(moment),
-        Kind::Ramp => Since::Gradual(moment),
+        Course::Whole => Since::Beginning,
+        Course::Step => Since::From(moment),
+        Course::Ramp => Since::Gradual(moment),
     }
 }

@@ -11,7 +11,7 @@ use super::lag;
 use super::pairs::{self, Pair};
 use super::posterior::{Cause, Posterior};
 use super::runs::{Run, Runs};
-use super::shapes::{Change, Class};
+use super::shapes::{Change, Class, ForceShape};
 use super::surface::Surface;
 use super::table_surface;
 use super::time_course::{self, TimeCourse};
@@ -66,11 +66,7 @@ fn without(runs: &Runs, surface: &Surface, accepted: &[Accepted]) -> Runs {
                 .iter()
                 .filter_map(|a| {
                     let time_course = a.time_course.as_ref()?;
-                    Some(
-                        a.size
-                            * time_course.at(means.clock)
-                            * time_course::in_full(a.change, &means, run.direction[i])?,
-                    )
+                    Some(a.size * time_course.at(means.clock) * a.change.in_full(&means, run.direction[i])?)
                 })
                 .sum()
         };
@@ -208,7 +204,9 @@ fn with_own_slopes(
     surface: &Surface,
     found: Accepted,
 ) -> Accepted {
-    if found.change != Change::EndSlip || surface.curves.iter().all(|c| c.own_by_stroke.is_empty()) {
+    if found.change.shape() != Some(ForceShape::StrokeStep)
+        || surface.curves.iter().all(|c| c.own_by_stroke.is_empty())
+    {
         return found;
     }
     let mut found = found;

@@ -111,6 +111,10 @@ impl Posterior {
 mod tests {
     use super::*;
 
+    fn change(name: &str) -> Change {
+        Change::from_name(name).expect("listed")
+    }
+
     #[test]
     fn a_class_leads_although_none_of_its_names_does() {
         let named = |c, l| (Cause::Named(c), l);
@@ -118,20 +122,20 @@ mod tests {
             &[
                 (Cause::None, 0.0),
                 (Cause::Unknown, 0.0),
-                named(Change::ForceGain, 9.0),
-                named(Change::GaugeGain, 8.9),
+                named(change("force-gain"), 9.0),
+                named(change("gauge-gain"), 8.9),
             ],
             0.8,
         );
-        assert_eq!(p.leader().map(|l| l.0), Some(Change::ForceGain));
+        assert_eq!(p.leader().map(|l| l.0), Some(change("force-gain")));
         let total: f64 = p.all.iter().map(|a| a.1).sum();
         assert!((total - 1.0).abs() < 1e-12);
-        assert!(p.set().contains(&Cause::Named(Change::GaugeGain)));
+        assert!(p.set().contains(&Cause::Named(change("gauge-gain"))));
     }
 
     #[test]
     fn without_evidence_the_prior_is_kept() {
-        let p = Posterior::of(&[(Cause::None, -3.0), (Cause::Named(Change::ForceGain), -3.0)], 0.8);
+        let p = Posterior::of(&[(Cause::None, -3.0), (Cause::Named(change("force-gain")), -3.0)], 0.8);
         assert!(p.probability(Cause::None) > 0.8 && p.leader().is_none());
         assert_eq!(p.set()[0], Cause::None);
     }

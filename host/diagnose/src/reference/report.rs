@@ -9,6 +9,7 @@ use super::criteria::{
 use super::held_out::Unseen;
 use super::isometric;
 use super::runs::Runs;
+use super::shapes::{self, Change};
 use super::staircase_answer::staircases;
 use super::stroke_answer::strokes;
 use super::stroked;
@@ -45,6 +46,19 @@ pub struct Options {
     pub mounted: Mounted,
     /// Prior probability that something changed, instead of the usual.
     pub prior_changed: Option<f64>,
+    /// Effects beyond the catalogue, which a test brings.
+    #[cfg(test)]
+    pub(crate) added: Vec<Change>,
+}
+
+impl Options {
+    /// The changes that readings at held lengths show, in the order in which they are tested.
+    fn tested(&self) -> Vec<Change> {
+        #[cfg(test)]
+        return shapes::tested(self.added.iter().copied());
+        #[cfg(not(test))]
+        shapes::tested([])
+    }
 }
 
 /// How the recordings were made.
@@ -174,7 +188,7 @@ fn beside_recordings(
     report.remarks.splice(0..0, remarks);
     withdraw(&mut report);
     if let Some(loss) = loss {
-        closed_valves::add(&mut report, &loss, prior(options, PRIOR_NONE));
+        closed_valves::add(&mut report, &loss, options.tested().len(), prior(options, PRIOR_NONE));
     }
     Ok(report)
 }
@@ -268,7 +282,7 @@ fn held(before: &Campaign, after: &Campaign, options: &Options) -> Result<(Chang
 fn recorded(runs: Runs, surface: Surface, options: &Options) -> Result<(ChangeReport, Option<Loss>)> {
     let loss = closed_valves::compare(&runs);
     let reference = isometric::Reference { surface, error: 0.0, recorded: true };
-    let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
+    let analysis = isometric::analyse(runs, reference, options.tested(), prior(options, PRIOR_NONE))?;
     Ok((staircases(&analysis, options), loss))
 }
 
@@ -282,7 +296,7 @@ fn against_table(table: &TableFile, after: &Campaign, runs: Runs, options: &Opti
     let stated = table.about.fit.rms_newtons;
     let error = if stated > 0.0 { stated } else { UNSTATED_ERROR * surface.largest };
     let reference = isometric::Reference { surface, error, recorded: false };
-    let analysis = isometric::analyse(runs, reference, prior(options, PRIOR_NONE))?;
+    let analysis = isometric::analyse(runs, reference, options.tested(), prior(options, PRIOR_NONE))?;
     let mut report = staircases(&analysis, options);
     report.remarks.push(table_remark(table, analysis.reference_error));
     Ok(report)

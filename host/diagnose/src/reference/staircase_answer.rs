@@ -17,7 +17,7 @@ use super::isometric::Analysis;
 use super::naming::Accepted;
 use super::posterior::Cause;
 use super::report::{Options, left, prior, verdict};
-use super::shapes::{CHANGES, Change, Class};
+use super::shapes::{Change, Class, ForceShape};
 use super::weighing::Estimate;
 use super::{cells, localise, repeatability};
 
@@ -188,9 +188,8 @@ fn changed(analysis: &Analysis, accepted: &Accepted) -> Changed {
 fn confusable(analysis: &Analysis, accepted: &Accepted) -> Vec<String> {
     let mut all: Vec<Change> = accepted.competitors.clone();
     let like = matches!(accepted.change.class(), Class::Gain | Class::Zero);
-    if analysis.runs.moving && like && !all.contains(&Change::GaugeOffset) {
-        all.push(Change::GaugeOffset);
-    }
+    let gauge = Change::of_shape(ForceShape::PressureSlope).filter(|_| analysis.runs.moving && like);
+    all.extend(gauge.filter(|zero| !accepted.competitors.contains(zero)));
     all.into_iter().map(|c| c.name().to_owned()).collect()
 }
 
@@ -201,14 +200,18 @@ fn widened(analysis: &Analysis) -> f64 {
 
 /// How inexact the shape of a change is, share of its size.
 fn slope_error(analysis: &Analysis, change: Change) -> f64 {
-    match change {
-        Change::ForceOffset | Change::ForceDrift | Change::CoulombFriction => SLOPE_ERROR,
+    match change.shape() {
+        Some(ForceShape::Constant | ForceShape::Time | ForceShape::Direction) => SLOPE_ERROR,
         _ if analysis.recorded && analysis.runs.moving => COMBINED_SHAPE_ERROR,
         _ if analysis.recorded => SLOPE_ERROR,
-        Change::EndSlip if analysis.surface.curves.iter().any(|c| !c.own_by_stroke.is_empty()) => {
+        Some(ForceShape::StrokeStep)
+            if analysis.surface.curves.iter().any(|c| !c.own_by_stroke.is_empty()) =>
+        {
             OWN_SLOPE_ERROR
         }
-        Change::DisplacementOffset | Change::RigCompliance | Change::EndSlip => TABLE_SLOPE_OVER_LENGTH,
+        Some(ForceShape::StrokeSlope | ForceShape::ForceTimesStrokeSlope | ForceShape::StrokeStep) => {
+            TABLE_SLOPE_OVER_LENGTH
+        }
         _ => TABLE_SLOPE_ERROR,
     }
 }
@@ -239,8 +242,10 @@ fn considered(analysis: &Analysis, options: &Options) -> Vec<Considered> {
     let odds = detectable::odds(none, names);
     let middle = SIZES[1] * analysis.surface.largest;
     let open = |change: Change| !analysis.accepted.iter().any(|a| a.change == change);
-    CHANGES
-        .into_iter()
+    analysis
+        .tested
+        .iter()
+        .copied()
         .filter(|change| open(*change))
         .map(|change| {
             let about = change.about();

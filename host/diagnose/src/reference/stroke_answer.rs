@@ -8,7 +8,7 @@ use super::criteria::{NAMED, POSSIBLE, STANDS_OUT, STROKE_PRIOR_NONE, STROKE_UNE
 use super::detectable;
 use super::held_out::Unseen;
 use super::report::{Options, left, prior};
-use super::shapes::{Change, Class};
+use super::shapes::{self, Change, Class, ForceShape};
 use super::stroked::{self, Compared, Weighed};
 use crate::criteria::judgement::DETECTION;
 use pam_data::error::Result;
@@ -34,9 +34,8 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
     };
     let unseen = Unseen { before, after, held: true };
     let places = if verdict == Verdict::Consistent { Vec::new() } else { stroke_places(compared) };
-    let mut probabilities: Vec<Probability> = stroked::TESTED
-        .iter()
-        .map(|c| Probability { cause: c.name().into(), probability: weighed.marginal(*c) })
+    let mut probabilities: Vec<Probability> = stroked::tested()
+        .map(|c| Probability { cause: c.name().into(), probability: weighed.marginal(c) })
         .chain([Probability { cause: "none".into(), probability: weighed.none() }])
         .collect();
     probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -58,14 +57,13 @@ pub(super) fn strokes(compared: &Compared, options: &Options) -> Result<ChangeRe
             share_where_shown: unseen.share(),
             noise_N: noise,
         },
-        considered: stroked::TESTED
-            .iter()
+        considered: stroked::tested()
             .filter(|c| !named.contains(c))
             .map(|c| Considered {
                 effect: c.name().into(),
-                gain: weighed.marginal(*c),
-                why_not: WhyNot::of(true, weighed.marginal(*c)),
-                detectable: weighed.alone.get(c).map(|(_, std)| detectable::size(*std, DETECTION)),
+                gain: weighed.marginal(c),
+                why_not: WhyNot::of(true, weighed.marginal(c)),
+                detectable: weighed.alone.get(&c).map(|(_, std)| detectable::size(*std, DETECTION)),
                 unit: c.about().changed.size.1.into(),
             })
             .collect(),
@@ -109,17 +107,10 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
     let about = change.about();
     let (value, std) = weighed.sizes.get(&change).copied().unwrap_or_default();
     let (before, after) = stroked::unseen(compared, &[change]);
-    let index = stroked::TESTED.iter().position(|c| *c == change).unwrap_or(0);
-    let shape = &compared.shapes[index];
-    let mut competitors: Vec<String> = stroked::TESTED
-        .iter()
-        .filter(|c| **c != change && c.class() == about.changed.class && weighed.marginal(**c) >= POSSIBLE)
-        .map(|c| c.name().to_owned())
-        .collect();
-    if change == Change::ForceGain {
-        // At regulated pressures the force grows with pressure: these three have one shape.
-        competitors.extend([Change::GaugeGain, Change::CrossTalk].map(|c| c.name().to_owned()));
-    }
+    let rms = compared.shape(change).map_or(0.0, |s| (s.norm_squared() / s.len().max(1) as f64).sqrt());
+    let possible =
+        |c: &Change| *c != change && c.class() == about.changed.class && weighed.marginal(*c) >= POSSIBLE;
+    let competitors = stroked::tested().filter(possible).chain(of_one_shape(change));
     Changed {
         change,
         effect: about.name.into(),
@@ -128,12 +119,21 @@ fn stroke_change(compared: &Compared, weighed: &Weighed, change: Change) -> Chan
         class: about.changed.class,
         share_explained: (1.0 - (after / before.max(f64::MIN_POSITIVE)).powi(2)).clamp(0.0, 1.0),
         parameters: vec![size(about.changed.size, value, std, 1e6, 0.0)],
-        confusable_with: competitors,
+        confusable_with: competitors.map(|c| c.name().to_owned()).collect(),
         since: Since::NotDetermined,
         owner: about.changed.owner,
         correction: change.is_bench(),
-        rms_N: (shape.norm_squared() / shape.len().max(1) as f64).sqrt() * value.abs(),
+        rms_N: rms * value.abs(),
     }
+}
+
+/// What strokes at regulated pressures do not distinguish from a change of the force in proportion: there the force grows with pressure.
+fn of_one_shape(change: Change) -> Vec<Change> {
+    let grows = [ForceShape::PressureTimesSlope, ForceShape::Pressure];
+    let same = |c: &Change| {
+        change.shape() == Some(ForceShape::Force) && c.shape().is_some_and(|s| grows.contains(&s))
+    };
+    shapes::tested([]).into_iter().filter(same).collect()
 }
 
 fn stroke_places(c: &Compared) -> Vec<Place> {
@@ -164,13 +164,7 @@ fn stroke_places(c: &Compared) -> Vec<Place> {
 fn stroke_curves(c: &Compared, weighed: &Weighed, named: &[Change]) -> Vec<Curve> {
     let n = c.keys.len();
     let explained = |i: usize| -> f64 {
-        named
-            .iter()
-            .filter_map(|change| {
-                let index = stroked::TESTED.iter().position(|a| a == change)?;
-                Some(weighed.sizes.get(change)?.0 * c.shapes[index][i])
-            })
-            .sum()
+        named.iter().filter_map(|change| Some(weighed.sizes.get(change)?.0 * c.shape(*change)?[i])).sum()
     };
     let mut all = Vec::new();
     for (l, pressure) in c.levels.iter().enumerate() {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::answer::NotComparable;
 use super::contrast::{log_mean, log_sum};
 use super::criteria::{SIZES, STROKE_BINS, STROKE_LENGTH, STROKE_REPEATS, STROKE_SETS, STROKED_FLOOR};
-use super::shapes::{Change, Class};
+use super::shapes::{Change, Class, ForceShape};
 use super::strokes::{Band, Key, bands, ends, levels};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
@@ -33,9 +33,14 @@ pub(crate) struct StrokeRepeats {
     pub friction_along: f64,
 }
 
+/// What strokes at regulated pressures are tested for: two shapes of the middle of the loop, and two of its half width.
+const TESTED: [ForceShape; 4] =
+    [ForceShape::Constant, ForceShape::Force, ForceShape::Direction, ForceShape::DirectionTimesPressure];
+
 /// The changes that are tested for strokes at regulated pressures.
-pub(super) const TESTED: [Change; 4] =
-    [Change::ForceOffset, Change::ForceGain, Change::CoulombFriction, Change::PressureFriction];
+pub(super) fn tested() -> impl Iterator<Item = Change> {
+    TESTED.into_iter().filter_map(Change::of_shape)
+}
 
 /// The differences of both campaigns.
 pub(super) struct Compared {
@@ -46,8 +51,8 @@ pub(super) struct Compared {
     /// Middles first, then halves, N.
     pub y: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Columns of [`TESTED`], N per unit.
-    pub shapes: Vec<DVector<f64>>,
+    /// Of each of [`TESTED`], N per unit.
+    shapes: Vec<DVector<f64>>,
     pub largest: f64,
     pub not_comparable: Vec<NotComparable>,
 }
@@ -76,6 +81,14 @@ impl Weighed {
     /// Probability that nothing changed.
     pub fn none(&self) -> f64 {
         self.sets.iter().filter(|(s, _)| s.is_empty()).map(|(_, p)| p).sum()
+    }
+}
+
+impl Compared {
+    /// What a change adds per unit of its size, N; `None` for a change that strokes are not tested for.
+    pub fn shape(&self, change: Change) -> Option<&DVector<f64>> {
+        let place = TESTED.iter().position(|s| change.shape() == Some(*s))?;
+        self.shapes.get(place)
     }
 }
 
@@ -137,12 +150,12 @@ pub(super) fn compare(before: &Campaign, after: &Campaign, reference_error: f64)
     let y = DVector::from_iterator(2 * n, (0..n).map(middle).chain((0..n).map(half)));
     // More friction counts positive whichever way force and displacement count.
     let way = if before.iter().map(|b| b.half).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
-    let column = |change: Change| {
-        let of = |i: usize| match (change, i < n) {
-            (Change::ForceOffset, true) => 1.0,
-            (Change::ForceGain, true) => before[i].middle,
-            (Change::CoulombFriction, false) => way,
-            (Change::PressureFriction, false) => way * before[i - n].pressure,
+    let column = |shape: ForceShape| {
+        let of = |i: usize| match (shape, i < n) {
+            (ForceShape::Constant, true) => 1.0,
+            (ForceShape::Force, true) => before[i].middle,
+            (ForceShape::Direction, false) => way,
+            (ForceShape::DirectionTimesPressure, false) => way * before[i - n].pressure,
             _ => 0.0,
         };
         DVector::from_fn(2 * n, |i, _| of(i))
@@ -233,15 +246,16 @@ pub(super) fn weigh(c: &Compared, none: f64) -> Result<Weighed> {
     let sets: Vec<(Vec<Change>, f64)> = STROKE_SETS
         .iter()
         .zip(&logs)
-        .map(|(s, l)| (s.iter().map(|k| TESTED[*k]).collect(), (l - total).exp()))
+        .map(|(s, l)| (s.iter().filter_map(|k| Change::of_shape(TESTED[*k])).collect(), (l - total).exp()))
         .collect();
     let of = |index: usize| -> BTreeMap<Change, (f64, f64)> {
         let Some((sizes, inverse)) = &fits[index] else { return BTreeMap::new() };
         let one = |(i, k): (usize, &usize)| {
             let unit = rms[*k].max(f64::MIN_POSITIVE);
-            (TESTED[*k], (sizes[i] / unit, inverse[(i, i)].max(0.0).sqrt() / unit))
+            let change = Change::of_shape(TESTED[*k])?;
+            Some((change, (sizes[i] / unit, inverse[(i, i)].max(0.0).sqrt() / unit)))
         };
-        STROKE_SETS[index].iter().enumerate().map(one).collect()
+        STROKE_SETS[index].iter().enumerate().filter_map(one).collect()
     };
     let alone = (1..=TESTED.len()).flat_map(of).collect();
     let mut weighed = Weighed { sets, sizes: BTreeMap::new(), alone };
@@ -262,7 +276,7 @@ pub(super) fn named(weighed: &Weighed) -> Vec<Change> {
     let mut all = Vec::new();
     for class in [Class::Gain, Class::Friction, Class::Zero] {
         if weighed.class(class) >= super::criteria::NAMED {
-            let mut own = TESTED.iter().copied().filter(|c| c.class() == class);
+            let mut own = tested().filter(|c| c.class() == class);
             let first = own.next();
             let best = own.fold(first, |best, c| match best {
                 Some(b) if weighed.marginal(b) >= weighed.marginal(c) => Some(b),
@@ -277,11 +291,10 @@ pub(super) fn named(weighed: &Weighed) -> Vec<Change> {
 /// rms of the difference without and with the changes, fitted to every other level (or part of the stroke) and judged on the rest, N.
 pub(super) fn unseen(c: &Compared, changes: &[Change]) -> (f64, f64) {
     let rms = |v: &DVector<f64>| (v.norm_squared() / v.len().max(1) as f64).sqrt();
-    let columns: Vec<DVector<f64>> = TESTED
-        .iter()
-        .zip(&c.shapes)
-        .filter(|(a, _)| changes.contains(a))
-        .map(|(_, s)| s / s.amax().max(f64::MIN_POSITIVE))
+    let columns: Vec<DVector<f64>> = tested()
+        .filter(|change| changes.contains(change))
+        .filter_map(|change| c.shape(change))
+        .map(|s| s / s.amax().max(f64::MIN_POSITIVE))
         .collect();
     if columns.is_empty() {
         return (rms(&c.y), rms(&c.y));

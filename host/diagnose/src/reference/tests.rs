@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
 
 use super::answer::{NotComparable, Remark, Since};
+use super::shapes::{Change, Owner};
 use super::{Against, ChangeReport, Mounted, Options, Verdict, compare};
+use crate::tests::added::AddedName;
 use pam_data::recording::{Campaign, Recording};
 
 /// Strokes of the mountings, m.
@@ -251,4 +253,40 @@ fn a_slip_is_not_judged_on_recordings_before_it() {
     let two = slip(3, &[7, 8]);
     assert_eq!(two.missing.first().map(|m| m.effect.as_str()), Some("end-slip"), "{:?}", two.probabilities);
     assert!(two.held_out.share_where_shown > 0.5, "{:?}", two.held_out);
+}
+
+#[test]
+fn a_change_of_an_effect_of_one_file_and_one_line_is_compared_with_a_reference() {
+    let before = campaign(3, 0..3, &untouched);
+    let mut after = campaign(3, 3..6, &untouched);
+    let (mut begin, duration) = (0.0, after.recordings.iter().map(Recording::duration).sum::<f64>());
+    for r in &mut after.recordings {
+        let times = r.time.clone();
+        r.force
+            .as_mut()
+            .unwrap()
+            .iter_mut()
+            .zip(times)
+            .for_each(|(f, t)| *f *= 1.0 - 0.08 * (begin + t) / duration);
+        begin += r.duration();
+    }
+    let asked = |added: Vec<Change>| {
+        let options = Options { mounted: Mounted::Same, added, ..Options::default() };
+        compare(&after, Against::Recordings(&before), &options).unwrap()
+    };
+    let without = asked(Vec::new());
+    assert_eq!(without.missing[0].effect, "force-gain", "{:?}", without.probabilities);
+    let with = asked(vec![Change::Added(AddedName::GainFade)]);
+    let gain = size(&with, "gain-fade");
+    assert!((gain + 0.08).abs() < 0.02, "{gain}");
+    assert!(matches!(with.missing[0].since, Since::Gradual(_)) && with.missing[0].owner == Owner::Sensor);
+    // One that did not change is considered with the size that would have been seen.
+    let options = Options {
+        mounted: Mounted::Same,
+        added: vec![Change::Added(AddedName::GainFade)],
+        ..Options::default()
+    };
+    let same = compare(&campaign(3, 3..6, &untouched), Against::Recordings(&before), &options).unwrap();
+    let considered = same.considered.iter().find(|c| c.effect == "gain-fade").unwrap();
+    assert!(considered.detectable.is_some_and(|d| d < 0.1), "{considered:?}");
 }

@@ -5,26 +5,15 @@
 
 use nalgebra::DVector;
 
-use super::cells::{Cell, Means, rms_after};
+use super::cells::{Cell, rms_after};
 use super::contrast::{Contrast, evidence, log_mean, log_sum};
 use super::criteria::{COURSE_INTERVAL, COURSE_LEAD, COURSE_PART, COURSE_WHOLE};
-use super::shapes::Change;
-
-/// How a change continues.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
-    /// As it is, through all of AFTER.
-    Whole,
-    /// Suddenly, at one time within AFTER.
-    Step,
-    /// Gradually, to the end.
-    Ramp,
-}
+use super::shapes::{Change, Course};
 
 /// What a change does while it is there in full, per unit of size, and the time courses that it may take; zero on BEFORE.
 pub(super) struct Candidate {
     pub shape: DVector<f64>,
-    pub kinds: &'static [Kind],
+    pub courses: &'static [Course],
 }
 
 /// When a change begins, on AFTER's clock, with the 95 % interval.
@@ -38,7 +27,7 @@ pub(super) struct Start {
 /// The time course that explains the difference best.
 #[derive(Debug, Clone)]
 pub(super) struct TimeCourse {
-    pub kind: Kind,
+    pub kind: Course,
     /// Whether it leads the other time courses.
     pub sure: bool,
     pub start: Start,
@@ -61,7 +50,7 @@ struct Tried {
     log: f64,
 }
 
-/// A change with the time courses that its name allows: an offset of the stroke that comes suddenly is a slip, a zero that grows is a drift.
+/// A change with the time courses that it may have: an offset of the stroke that comes suddenly is a slip, a zero that grows is a drift.
 /// `None` for a change that settled cells do not show by a shape.
 pub(super) fn candidate(cells: &[Cell], change: Change) -> Option<Candidate> {
     let on = |value: &dyn Fn(&Cell) -> Option<f64>| {
@@ -69,34 +58,19 @@ pub(super) fn candidate(cells: &[Cell], change: Change) -> Option<Candidate> {
             cells.iter().map(|c| if c.after { value(c) } else { Some(0.0) }).collect();
         all.map(DVector::from_vec)
     };
-    let kinds: &[Kind] = match change {
-        Change::EndSlip => &[Kind::Step],
-        Change::ForceDrift => &[Kind::Ramp],
-        Change::DisplacementOffset => &[Kind::Whole, Kind::Ramp],
-        Change::ForceOffset => &[Kind::Whole, Kind::Step],
-        _ => &[Kind::Whole, Kind::Step, Kind::Ramp],
-    };
-    Some(Candidate { shape: on(&|c| in_full(change, &c.means, c.direction))?, kinds })
+    let shape = on(&|c| change.in_full(&c.means, c.direction))?;
+    Some(Candidate { shape, courses: change.about().changed.courses })
 }
 
-/// What a change adds to the force per unit of size once it is there in full.
-pub(super) fn in_full(change: Change, means: &Means, direction: f64) -> Option<f64> {
-    match change {
-        Change::EndSlip => Some(means.step_by_stroke),
-        Change::ForceDrift => Some(1.0),
-        other => other.shape(means, direction),
-    }
-}
-
-fn factor(kind: Kind, start: f64, clock: f64) -> f64 {
+fn factor(kind: Course, start: f64, clock: f64) -> f64 {
     match kind {
-        Kind::Whole => 1.0,
-        Kind::Step => f64::from(u8::from(clock >= start)),
-        Kind::Ramp => ((clock - start) / (1.0 - start)).max(0.0),
+        Course::Whole => 1.0,
+        Course::Step => f64::from(u8::from(clock >= start)),
+        Course::Ramp => ((clock - start) / (1.0 - start)).max(0.0),
     }
 }
 
-fn with_time_course(cells: &[Cell], shape: &DVector<f64>, kind: Kind, start: f64) -> DVector<f64> {
+fn with_time_course(cells: &[Cell], shape: &DVector<f64>, kind: Course, start: f64) -> DVector<f64> {
     let of = |(c, s): (&Cell, &f64)| s * factor(kind, start, c.means.clock);
     DVector::from_iterator(cells.len(), cells.iter().zip(shape.iter()).map(of))
 }
@@ -169,10 +143,10 @@ fn products(cells: &[Cell], contrast: &Contrast, shape: &DVector<f64>) -> AllPro
 }
 
 /// Log evidence of one kind over all its starts. A ramp grows from the beginning in half of the cases.
-fn over_starts(kind: Kind, tried: &[Tried]) -> f64 {
+fn over_starts(kind: Course, tried: &[Tried]) -> f64 {
     let logs: Vec<f64> = tried.iter().map(|t| t.log).collect();
     match (kind, logs.split_last()) {
-        (Kind::Ramp, Some((first, later))) if !later.is_empty() => log_mean(&[*first, log_mean(later)]),
+        (Course::Ramp, Some((first, later))) if !later.is_empty() => log_mean(&[*first, log_mean(later)]),
         _ => log_mean(&logs),
     }
 }
@@ -185,7 +159,7 @@ pub(super) fn of(
     scale: f64,
     sizes: &[f64],
 ) -> Option<TimeCourse> {
-    let Candidate { shape, kinds } = candidate;
+    let Candidate { shape, courses } = candidate;
     let all = products(cells, contrast, shape);
     let tried = |from: &[(f64, Products)]| -> Vec<Tried> {
         let log = |(a, b, square): Products| {
@@ -194,18 +168,18 @@ pub(super) fn of(
         };
         from.iter().map(|(start, products)| Tried { start: *start, log: log(*products) }).collect()
     };
-    let mut time_courses: Vec<(Kind, f64, Vec<Tried>)> = Vec::new();
-    for kind in *kinds {
+    let mut time_courses: Vec<(Course, f64, Vec<Tried>)> = Vec::new();
+    for kind in *courses {
         let tried = match kind {
-            Kind::Whole => tried(&[(0.0, all.whole)]),
-            Kind::Step => tried(&all.steps),
-            Kind::Ramp => tried(&all.ramps),
+            Course::Whole => tried(&[(0.0, all.whole)]),
+            Course::Step => tried(&all.steps),
+            Course::Ramp => tried(&all.ramps),
         };
         // Most changes happen between two campaigns, and not within the later one.
         let prior = match kind {
-            _ if kinds.len() == 1 => 1.0,
-            Kind::Whole => COURSE_WHOLE,
-            _ => (1.0 - COURSE_WHOLE) / (kinds.len() as f64 - 1.0),
+            _ if courses.len() == 1 => 1.0,
+            Course::Whole => COURSE_WHOLE,
+            _ => (1.0 - COURSE_WHOLE) / (courses.len() as f64 - 1.0),
         };
         let log = prior.ln() + over_starts(*kind, &tried);
         if log.is_finite() {
@@ -253,6 +227,7 @@ fn start(tried: &[Tried]) -> Option<Start> {
 mod tests {
     use nalgebra::DMatrix;
 
+    use super::super::cells::Means;
     use super::*;
 
     /// Two cells of BEFORE and eight of AFTER in no order of time, with correlations.
@@ -277,9 +252,9 @@ mod tests {
     fn products_from_sums_are_those_of_the_shapes() {
         let (cells, contrast, shape) = example();
         let all = products(&cells, &contrast, &shape);
-        let mut each = vec![(Kind::Whole, 0.0, all.whole)];
-        each.extend(all.steps.iter().map(|(t, p)| (Kind::Step, *t, *p)));
-        each.extend(all.ramps.iter().map(|(t, p)| (Kind::Ramp, *t, *p)));
+        let mut each = vec![(Course::Whole, 0.0, all.whole)];
+        each.extend(all.steps.iter().map(|(t, p)| (Course::Step, *t, *p)));
+        each.extend(all.ramps.iter().map(|(t, p)| (Course::Ramp, *t, *p)));
         assert_eq!(each.len(), 1 + 7 + 8);
         for (kind, start, (a, b, square)) in each {
             let direct = with_time_course(&cells, &shape, kind, start);
@@ -293,11 +268,11 @@ mod tests {
     #[test]
     fn a_step_is_found_between_the_cells_beside_it() {
         let (cells, contrast, shape) = example();
-        let stepped = with_time_course(&cells, &shape, Kind::Step, 0.5) * 30.0;
+        let stepped = with_time_course(&cells, &shape, Course::Step, 0.5) * 30.0;
         let contrast = contrast.with_residual(&contrast.residual + stepped);
-        let candidate = Candidate { shape, kinds: &[Kind::Whole, Kind::Step, Kind::Ramp] };
+        let candidate = Candidate { shape, courses: &[Course::Whole, Course::Step, Course::Ramp] };
         let time_course = of(&cells, &contrast, &candidate, 1.0, &[10.0, 30.0]).expect("a time course");
-        assert_eq!((time_course.kind, time_course.sure), (Kind::Step, true));
+        assert_eq!((time_course.kind, time_course.sure), (Course::Step, true));
         assert!((time_course.start.at - 0.5).abs() < 1e-9, "{:?}", time_course.start);
         assert!(time_course.start.low < 0.5 && time_course.start.high > 0.5, "{:?}", time_course.start);
     }

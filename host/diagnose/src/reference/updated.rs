@@ -10,7 +10,7 @@ use pam_fit::table_file::TableFile;
 use super::answer::{ChangeReport, Changed};
 use super::criteria::{UPDATE_COVERED, UPDATE_LAWS, UPDATE_LEVELS};
 use super::runs::mountings;
-use super::shapes::{Change, Class};
+use super::shapes::{Change, Class, Coefficient};
 use super::strokes::levels;
 use pam_data::statistics::range;
 
@@ -37,12 +37,12 @@ pub(super) fn is_repaired(changed: &Changed) -> bool {
 fn apply(table: &mut MuscleTable, changed: &Changed, which: usize) -> bool {
     let Some(size) = changed.parameters.first().map(|p| p.value) else { return false };
     match changed.change {
-        Change::ElasticStiffening => {
+        Change::Coefficient(Coefficient::ElasticStiffening) => {
             let curves = table.elastic.iter_mut().flatten();
             curves.for_each(|e| *e = (f64::from(*e) * (1.0 + size)) as f32);
             true
         }
-        Change::FrictionFactor => {
+        Change::Coefficient(Coefficient::FrictionFactor) => {
             table.friction.iter_mut().for_each(|k| *k = (f64::from(*k) + size) as f32);
             true
         }

@@ -8,9 +8,9 @@ use super::criteria::{LAG_CONTRADICTED, LAG_CORRECTED, SIZES};
 use super::lag::{self, Shift};
 use super::leave_one_mounting_out::{self, WeighedChange};
 use super::posterior::{Cause, Posterior};
-use super::shapes::{CHANGES, Change};
+use super::shapes::{Change, Course, ForceShape};
 use super::surface::Surface;
-use super::time_course::{self, Candidate, Kind, TimeCourse};
+use super::time_course::{self, Candidate, TimeCourse};
 use super::unknown;
 
 /// The size of a change if it is the only one left, SI.
@@ -59,6 +59,8 @@ impl Inexact {
 #[derive(Clone, Copy)]
 pub(super) struct Weighing<'a> {
     pub surface: &'a Surface,
+    /// The changes that are tested, in order.
+    pub tested: &'a [Change],
     /// The lag between the channels, where it is tested.
     pub lag: Option<&'a Shift>,
     pub inexact: Inexact,
@@ -67,17 +69,18 @@ pub(super) struct Weighing<'a> {
     pub prior_none: f64,
 }
 
-/// A change with the time courses with which it is tested. Parts of a motion overlap in time: there only a slip has another time course than the whole.
+/// A change with the time courses with which it is tested. Parts of a motion overlap in time: there only what begins later, as a slip does,
+/// has another time course than the whole.
 fn candidate(cells: &[Cell], change: Change, moving: bool) -> Option<Candidate> {
-    if moving && change != Change::EndSlip {
-        return Some(Candidate { shape: whole(cells, change)?, kinds: &[Kind::Whole] });
+    match whole(cells, change) {
+        Some(shape) if moving => Some(Candidate { shape, courses: &[Course::Whole] }),
+        _ => time_course::candidate(cells, change),
     }
-    time_course::candidate(cells, change)
 }
 
 /// The shape of a change that was there from the beginning of AFTER.
 fn whole(cells: &[Cell], change: Change) -> Option<DVector<f64>> {
-    let of = |c: &Cell| change.shape(&c.means, c.direction).map(|s| if c.after { s } else { 0.0 });
+    let of = |c: &Cell| change.throughout(&c.means, c.direction).map(|s| if c.after { s } else { 0.0 });
     let values: Option<Vec<f64>> = cells.iter().map(of).collect();
     values.map(DVector::from_vec)
 }
@@ -96,7 +99,7 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
     let still = by.lag.map_or(0.0, |l| l.unchanged);
     let mut estimates = Vec::new();
     let mut time_courses: Vec<(Change, TimeCourse)> = Vec::new();
-    for change in CHANGES {
+    for &change in by.tested {
         let candidate = candidate(cells, change, by.moving);
         let time_course = candidate.and_then(|c| time_course::of(cells, contrast, &c, scale, &sizes));
         let Some(time_course) = time_course.filter(|c| c.log.is_finite()) else { continue };
@@ -125,8 +128,9 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
     if let Some(unknown) = unknown {
         all.push((Cause::Unknown, unknown.log + still));
     }
-    if let Some(lag) = by.lag {
-        let (change, log) = weigh_lag(cells, contrast, lag);
+    if let Some(lag) = by.lag
+        && let Some((change, log)) = weigh_lag(cells, contrast, lag)
+    {
         all.push((Cause::Named(change), log));
         let rms = rms_after(cells, &lag::trace(cells)) / lag.lag.abs().max(1e-9);
         estimates.push(Estimate { change, size: lag.lag.abs(), std: lag.variance.sqrt(), rms });
@@ -142,17 +146,18 @@ pub(super) fn weigh(cells: &[Cell], contrast: &Contrast, by: Weighing<'_>) -> Ro
 }
 
 /// The lag with its trace in the settled cells, which it must not contradict.
-fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> (Change, f64) {
+fn weigh_lag(cells: &[Cell], contrast: &Contrast, lag: &Shift) -> Option<(Change, f64)> {
     let trace = lag::trace(cells);
     let scale = contrast.scale();
-    let change = if lag.lag > 0.0 { Change::SensorDelay } else { Change::PressureSensorLag };
+    let late = if lag.lag > 0.0 { ForceShape::LateForce } else { ForceShape::LatePressure };
+    let change = Change::of_shape(late)?;
     if trace.iter().all(|v| *v == 0.0) {
-        return (change, lag.changed);
+        return Some((change, lag.changed));
     }
     let freed = &contrast.residual - &trace;
     let image = &contrast.projector * &freed;
     let gain = 0.5 * (contrast.energy - freed.dot(&image)) / scale;
     let (a, b) = (trace.dot(&(&contrast.projector * &trace)), trace.dot(&image));
     let own = evidence(a, b, scale, &[LAG_CORRECTED]);
-    (change, gain + own.max(LAG_CONTRADICTED) + lag.changed)
+    Some((change, gain + own.max(LAG_CONTRADICTED) + lag.changed))
 }

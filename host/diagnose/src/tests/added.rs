@@ -1,22 +1,25 @@
-//! Adding an effect takes its file and one line of a list: here both are outside the catalogue, and the diagnosis finds the effect,
-//! fits its shape and says what would show it, from that file alone.
+//! Adding an effect takes its file and one line of a list: here both are outside the catalogue. From the file alone, the diagnosis finds the
+//! effect, fits its shape and says what would show it, and a comparison with a reference names a change of it.
 
+mod gain_fade;
 mod stroke_ripple;
 
 use super::*;
 use crate::candidates::Law;
-use crate::reference::shapes::{self, Class, Owner};
+use crate::reference::shapes::{Change, Class, Owner};
 
 model_core::effect_list! {
     /// Effects beyond the catalogue.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     AddedName:
+    /// The gain of the load cell falls.
+    GainFade = gain_fade;
     /// The stroke changes the force periodically.
     StrokeRipple = stroke_ripple;
 }
 
 fn diagnosed(campaign: &Campaign) -> Diagnosis {
-    let added = AddedName::ALL.iter().copied().map(Law::Added).collect();
+    let added = vec![Law::Added(AddedName::StrokeRipple)];
     let options = Options { muscle: "test".into(), added, ..Options::default() };
     diagnose(campaign, &geometry(), &options).expect("an answer")
 }
@@ -45,14 +48,13 @@ fn an_effect_of_one_file_and_one_line_is_considered_and_found() {
 
 #[test]
 fn the_change_of_an_effect_is_described_in_its_file() {
-    let about =
-        shapes::of_file(AddedName::StrokeRipple.info(), AddedName::StrokeRipple.traits()).expect("a change");
+    let about = Change::Added(AddedName::StrokeRipple).about();
     assert_eq!(about.name, "stroke-ripple");
     assert_eq!(about.changed.class, Class::Alone("stroke-ripple"));
     assert_eq!((about.changed.owner, about.changed.remembers), (Owner::Rig, false));
 }
 
-/// An effect is defined in its file: no other production code of the diagnosis knows one by its name.
+/// An effect is defined in its file: no other production code of the diagnosis knows one by its name, and no comparison by its variant.
 #[test]
 fn no_effect_is_known_by_its_name() {
     let mut folders = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
@@ -65,8 +67,14 @@ fn no_effect_is_known_by_its_name() {
             } else if path.is_file() && !path.ends_with("tests.rs") {
                 let text = std::fs::read_to_string(&path).expect("a source file");
                 let production = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
-                let named =
-                    |law: &pam_fit::bench::Candidate| production.contains(&format!("\"{}\"", law.name()));
+                let compares =
+                    path.components().any(|c| c.as_os_str() == "reference") || path.ends_with("health.rs");
+                let named = |law: &pam_fit::bench::Candidate| {
+                    let variant = format!("{law:?}");
+                    let variant = variant.trim_end_matches(')').rsplit('(').next().unwrap_or_default();
+                    production.contains(&format!("\"{}\"", law.name()))
+                        || compares && production.contains(&format!("Name::{variant}"))
+                };
                 found
                     .extend(pam_fit::bench::Candidate::all().filter(named).map(|l| (path.clone(), l.name())));
             }

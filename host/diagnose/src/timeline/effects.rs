@@ -21,8 +21,7 @@ pub(super) fn comparisons(visits: &[Visit], options: &Options<'_>) -> Result<Vec
         muscle: options.muscle.map(|m| m.name.clone()),
         rest_length: options.muscle.map(MuscleDescription::rest_length),
         mounted: options.mounted,
-        prior_changed: None,
-        geometry: None,
+        ..reference::Options::default()
     };
     let one = |(i, visit): (usize, &Visit)| -> Result<Option<ChangeReport>> {
         if i == options.reference {

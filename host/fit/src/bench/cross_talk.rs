@@ -3,8 +3,8 @@
 //! `c`, m²: thrust on an end cap, a hose that straightens. Pressurise with the muscle disconnected, or blocked at both ends.
 
 use model_core::effects::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
-    Traits, Vented,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, ForceShape, Info, Inspect, Link, Memory, Owner,
+    Parameter, Start, Traits, Vented,
 };
 use model_core::scalar::Scalar;
 
@@ -29,7 +29,13 @@ impl Effect for CrossTalk {
     const TRAITS: Traits = Traits::shown_by(Experiment::DeadWeights)
         .check(BenchCheck::DeadWeights)
         .vented(Vented::Everything)
-        .changed(Changed::new(Class::Gain, Owner::Rig, "ΔF = c·P").sized("thrust_area", "m²"));
+        .changed(
+            Changed::new(Class::Gain, Owner::Rig, "ΔF = c·P")
+                .sized("thrust_area", "m²")
+                .adds(ForceShape::Pressure)
+                .correctable()
+                .inspect(Inspect::PressureOnLoadCell),
+        );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.pressure

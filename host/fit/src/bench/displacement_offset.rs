@@ -3,8 +3,8 @@
 //! `δ`, m, is how much more the muscle is contracted than the stroke says. First order. Measure the vented length with a caliper.
 
 use model_core::effects::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter,
-    Start, Traits,
+    BenchCheck, Changed, Class, Context, Course, Effect, Experiment, ForceShape, Imitates, Info, Inspect,
+    Link, Memory, Owner, Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -29,7 +29,15 @@ impl Effect for DisplacementOffset {
     const TRAITS: Traits = Traits::shown_by(Experiment::VentedLength)
         .check(BenchCheck::VentedLength)
         .imitates(Imitates::Description)
-        .changed(Changed::new(Class::Gain, Owner::Rig, "ΔF = δ·∂F/∂x").sized("offset", "m"));
+        .changed(
+            Changed::new(Class::Gain, Owner::Rig, "ΔF = δ·∂F/∂x")
+                .sized("offset", "m")
+                .adds(ForceShape::StrokeSlope)
+                // A sudden one is a slip.
+                .courses(&[Course::Whole, Course::Ramp])
+                .correctable()
+                .inspect(Inspect::MountedLength),
+        );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0] * context.slope()

@@ -8,8 +8,8 @@
 //! from. Tare at the beginning, between levels and at the end.
 
 use model_core::effects::{
-    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, Memory, Owner, Parameter, Start, Traits,
-    Vented, decay,
+    Changed, Class, Context, Course, Effect, Experiment, Fading, ForceShape, Info, Inspect, Link, Memory,
+    Owner, Parameter, Start, Traits, Vented, decay,
 };
 use model_core::scalar::Scalar;
 
@@ -41,10 +41,15 @@ impl Effect for ForceDrift {
         source: "creep of 0.02 to 0.05 % of full scale in 20 to 30 minutes: manufacturers of load cells (VPG technical note VPGT-02)",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::VentedReadings)
-        .vented(Vented::Everything)
-        .slow()
-        .changed(Changed::new(Class::Zero, Owner::Sensor, "ΔF = δ·t/T").sized("drift_to_end", "N"));
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::VentedReadings).vented(Vented::Everything).slow().changed(
+            Changed::new(Class::Zero, Owner::Sensor, "ΔF = δ·t/T")
+                .sized("drift_to_end", "N")
+                // A drift over one campaign does not show that of the next, so it is not correctable.
+                .adds(ForceShape::Time)
+                .courses(&[Course::Ramp])
+                .inspect(Inspect::LoadCellWarmUp),
+        );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         Cell::step(memory, context.dt, &[parameters[4]], &[context.force()]);

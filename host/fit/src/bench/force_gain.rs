@@ -3,8 +3,8 @@
 //! `γ` (dimensionless), `γ_2`, 1/N; `F`, N, the base model's force. Hang known weights.
 
 use model_core::effects::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter,
-    Start, Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, ForceShape, Imitates, Info, Inspect, Link,
+    Memory, Owner, Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -32,7 +32,13 @@ impl Effect for ForceGain {
     const TRAITS: Traits = Traits::shown_by(Experiment::DeadWeights)
         .check(BenchCheck::DeadWeights)
         .imitates(Imitates::Description)
-        .changed(Changed::new(Class::Gain, Owner::Sensor, "ΔF = γ·F").sized("gain", ""));
+        .changed(
+            Changed::new(Class::Gain, Owner::Sensor, "ΔF = γ·F")
+                .sized("gain", "")
+                .adds(ForceShape::Force)
+                .correctable()
+                .inspect(Inspect::LoadCellScale),
+        );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         let pull = context.force();

@@ -3,8 +3,8 @@
 //! Ten seconds of a vented, slack muscle at either end of a recording settle it; without them free tables absorb it.
 
 use model_core::effects::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
-    Traits, Vented,
+    BenchCheck, Changed, Class, Context, Course, Effect, Experiment, ForceShape, Info, Inspect, Link, Memory,
+    Owner, Parameter, Start, Traits, Vented,
 };
 use model_core::scalar::Scalar;
 
@@ -29,7 +29,15 @@ impl Effect for ForceOffset {
     const TRAITS: Traits = Traits::shown_by(Experiment::VentedReadings)
         .check(BenchCheck::Weighing)
         .vented(Vented::Constant)
-        .changed(Changed::new(Class::Zero, Owner::Sensor, "ΔF = b").sized("offset", "N"));
+        .changed(
+            Changed::new(Class::Zero, Owner::Sensor, "ΔF = b")
+                .sized("offset", "N")
+                .adds(ForceShape::Constant)
+                // One that grows is a drift.
+                .courses(&[Course::Whole, Course::Step])
+                .correctable()
+                .inspect(Inspect::LoadCellZero),
+        );
 
     fn force<T: Scalar>(parameters: &[T], _context: &Context<T>, _memory: &Memory<T>) -> T {
         parameters[0]

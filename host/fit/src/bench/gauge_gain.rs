@@ -4,8 +4,8 @@
 //! direction-dependent friction within a few per cent: compare with a reference gauge at three pressures.
 
 use model_core::effects::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter,
-    Start, Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, ForceShape, Imitates, Info, Inspect, Link,
+    Memory, Owner, Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -33,7 +33,13 @@ impl Effect for GaugeGain {
     const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge)
         .check(BenchCheck::ReferenceGauge)
         .imitates(Imitates::Description)
-        .changed(Changed::new(Class::Gain, Owner::Sensor, "ΔF = −γ·P·∂F/∂P").sized("gain", ""));
+        .changed(
+            Changed::new(Class::Gain, Owner::Sensor, "ΔF = −γ·P·∂F/∂P")
+                .sized("gain", "")
+                .takes(ForceShape::PressureTimesSlope)
+                .correctable()
+                .inspect(Inspect::GaugeScale),
+        );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {
         context.pull_per_pressure() * context.pressure * (parameters[0] + parameters[1] * context.pressure)

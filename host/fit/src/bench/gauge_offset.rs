@@ -4,8 +4,8 @@
 //! gauge's zero". Read the gauge with the muscle vented.
 
 use model_core::effects::{
-    Changed, Class, Context, Effect, Experiment, Imitates, Info, Link, Memory, Owner, Parameter, Start,
-    Traits,
+    Changed, Class, Context, Effect, Experiment, ForceShape, Imitates, Info, Inspect, Link, Memory, Owner,
+    Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -28,7 +28,11 @@ impl Effect for GaugeOffset {
     };
 
     const TRAITS: Traits = Traits::shown_by(Experiment::ReferenceGauge).imitates(Imitates::Deadband).changed(
-        Changed::new(Class::GaugeOffset, Owner::SensorOrMuscle, "ΔF = −δ·∂F/∂P").sized("offset", "Pa"),
+        Changed::new(Class::GaugeOffset, Owner::SensorOrMuscle, "ΔF = −δ·∂F/∂P")
+            .sized("offset", "Pa")
+            .takes(ForceShape::PressureSlope)
+            .correctable()
+            .inspect(Inspect::GaugeZero),
     );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

@@ -5,7 +5,8 @@
 //! regulator (`pressure-lag`) has the opposite sign.
 
 use model_core::effects::{
-    Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start, Traits,
+    Changed, Class, Context, Effect, Experiment, ForceShape, Info, Inspect, Link, Memory, Owner, Parameter,
+    Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -29,7 +30,10 @@ impl Effect for PressureSensorLag {
 
     const TRAITS: Traits = Traits::shown_by(Experiment::PressureRamps).made_from_base().changed(
         Changed::new(Class::PressureSensorLag, Owner::Sensor, "P reads late by a first-order lag τ")
-            .sized("time_constant", "s"),
+            .sized("time_constant", "s")
+            .adds(ForceShape::LatePressure)
+            .correctable()
+            .inspect(Inspect::PressureLine),
     );
 
     fn force<T: Scalar>(parameters: &[T], context: &Context<T>, _memory: &Memory<T>) -> T {

@@ -10,8 +10,8 @@
 //! place.
 
 use model_core::effects::{
-    BenchCheck, Changed, Class, Context, Effect, Experiment, Info, Link, Memory, Owner, Parameter, Start,
-    Traits,
+    BenchCheck, Changed, Class, Context, Effect, Experiment, ForceShape, Info, Inspect, Link, Memory, Owner,
+    Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -41,7 +41,13 @@ impl Effect for RigCompliance {
         .made_from_base()
         .check(BenchCheck::RigidBar)
         .consistent(gives_alike)
-        .changed(Changed::new(Class::Gain, Owner::Rig, "ΔF = c·F·∂F/∂x").sized("compliance", "m/N"));
+        .changed(
+            Changed::new(Class::Gain, Owner::Rig, "ΔF = c·F·∂F/∂x")
+                .sized("compliance", "m/N")
+                // Not correctable: the law has a part at reversals that this shape does not measure.
+                .adds(ForceShape::ForceTimesStrokeSlope)
+                .inspect(Inspect::Frame),
+        );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         // memory: [z, last stroke, seen]

@@ -9,8 +9,8 @@
 //! never described to first order only: away from reversals that would be friction.
 
 use model_core::effects::{
-    Changed, Class, Context, Effect, Experiment, Fading, Info, Link, MEMORY, Memory, Owner, Parameter, Start,
-    Traits,
+    Changed, Class, Context, Effect, Experiment, Fading, ForceShape, Info, Inspect, Link, MEMORY, Memory,
+    Owner, Parameter, Start, Traits,
 };
 use model_core::scalar::Scalar;
 
@@ -50,10 +50,16 @@ impl Effect for SensorDelay {
         source: "first-order filter, skew or dead time; 1 to 100 ms are usual",
     };
 
-    const TRAITS: Traits = Traits::shown_by(Experiment::Speeds)
-        .made_from_base()
-        .consistent(passes_no_more)
-        .changed(Changed::new(Class::SensorDelay, Owner::Sensor, "F(t) = S(P(t − τ))").sized("delay", "s"));
+    const TRAITS: Traits =
+        Traits::shown_by(Experiment::Speeds).made_from_base().consistent(passes_no_more).changed(
+            Changed::new(Class::SensorDelay, Owner::Sensor, "F(t) = S(P(t − τ))")
+                .sized("delay", "s")
+                // The delay is the first parameter: a reading that is late to first order adds to the expected force.
+                .adds(ForceShape::LateForce)
+                .class_in_strokes(Class::RateOrPhase)
+                .correctable()
+                .inspect(Inspect::ForceChannel),
+        );
 
     fn step<T: Scalar>(parameters: &[T], context: &Context<T>, memory: &mut Memory<T>) {
         let time = parameters[3];

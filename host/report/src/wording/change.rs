@@ -8,7 +8,7 @@ use pam_diagnose::reference::answer::{
     ChangeReport, Changed, Left, Moment, NotComparable, Place, Remark, Repeatability, Since, Size, Split,
     Verdict, WhyNot,
 };
-use pam_diagnose::reference::shapes::{Change, Class, Owner};
+use pam_diagnose::reference::shapes::{Change, Inspect, Owner};
 
 use super::separate;
 
@@ -109,39 +109,33 @@ pub fn why_not(why: WhyNot) -> &'static str {
 /// What to do about a change.
 #[must_use]
 pub fn remedy(change: Change) -> &'static str {
-    match change {
-        Change::ForceOffset => "re-zero the load cell with nothing pulling on it",
-        Change::ForceGain => "check the load cell's calibration with a known weight",
-        Change::GaugeGain => "compare the pressure gauge with another one at a high pressure",
-        Change::GaugeOffset => {
+    match change.about().changed.inspect {
+        Inspect::LoadCellZero => "re-zero the load cell with nothing pulling on it",
+        Inspect::LoadCellScale => "check the load cell's calibration with a known weight",
+        Inspect::GaugeScale => "compare the pressure gauge with another one at a high pressure",
+        Inspect::GaugeZero => {
             "vent and read the gauge; if it reads zero, the actuator's deadband has changed"
         }
-        Change::CrossTalk => "look for a hose or fitting whose pressure acts on the load cell",
-        Change::DisplacementOffset => "measure the mounted length, re-zero the stroke and clamp again",
-        Change::CoulombFriction => "look at guides, alignment and lubrication",
-        Change::PressureFriction => "look at the seal, or at wear and lubrication of the braid",
-        Change::FrictionFactor => {
-            "the braid rubs differently: look at wear and lubrication, then refit the table"
-        }
-        Change::ElasticStiffening => "the bladder has become stiffer or softer: refit the table",
-        Change::ForceDrift => "let the load cell warm up, and tare at both ends of a campaign",
-        Change::RigCompliance => "tighten bolts and clamps, and stiffen the frame",
-        Change::EndSlip => "look at the end fittings, clamp again and measure the length",
-        Change::SensorDelay => "look at the filter settings and the sampling of the force channel",
-        Change::PressureSensorLag => {
+        Inspect::PressureOnLoadCell => "look for a hose or fitting whose pressure acts on the load cell",
+        Inspect::MountedLength => "measure the mounted length, re-zero the stroke and clamp again",
+        Inspect::Guides => "look at guides, alignment and lubrication",
+        Inspect::SealOrBraid => "look at the seal, or at wear and lubrication of the braid",
+        Inspect::Braid => "the braid rubs differently: look at wear and lubrication, then refit the table",
+        Inspect::Bladder => "the bladder has become stiffer or softer: refit the table",
+        Inspect::LoadCellWarmUp => "let the load cell warm up, and tare at both ends of a campaign",
+        Inspect::Frame => "tighten bolts and clamps, and stiffen the frame",
+        Inspect::EndFittings => "look at the end fittings, clamp again and measure the length",
+        Inspect::ForceChannel => "look at the filter settings and the sampling of the force channel",
+        Inspect::PressureLine => {
             "look for a long or throttled line to the pressure sensor, and at its filter"
         }
-        Change::Effect(_) if change.effect().is_some_and(|e| e.traits().loses_air) => {
+        Inspect::Leaks => {
             "close the valve for a minute and watch the pressure; look for leaks at fittings, valve and bladder"
         }
-        Change::Effect(_) => match (change.about().changed.owner, change.class()) {
-            (Owner::Rig, _) => "look at the load path between muscle and load cell",
-            (_, Class::RateOrPhase) => "look at hoses, valves and filters, then refit the table",
-            (_, Class::Softening | Class::Relaxation) => {
-                "let the muscle rest, repeat the first recording, then refit the table"
-            }
-            _ => "look at the muscle and its end fittings, then refit the table",
-        },
+        Inspect::LoadPath => "look at the load path between muscle and load cell",
+        Inspect::Hoses => "look at hoses, valves and filters, then refit the table",
+        Inspect::Rest => "let the muscle rest, repeat the first recording, then refit the table",
+        Inspect::Muscle => "look at the muscle and its end fittings, then refit the table",
     }
 }
 

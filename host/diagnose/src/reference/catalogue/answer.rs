@@ -14,7 +14,7 @@ use super::super::criteria::{
 use super::super::detectable;
 use super::super::held_out::{Unseen, parts, shown};
 use super::super::report::left;
-use super::super::shapes::Change;
+use super::super::shapes::Course;
 use super::cells::{Cell, Cells, VENTED};
 use super::weigh::{Accepted, Fit, Weighed};
 
@@ -102,9 +102,10 @@ fn moment(cells: &Cells, [at, low, high]: [f64; 3]) -> Moment {
 
 /// Since when: the change as it is, from one recording on, or growing over AFTER.
 fn since(cells: &Cells, fit: &Fit) -> Since {
-    match fit.change {
-        Change::ForceDrift => return Since::Gradual(moment(cells, [0.0; 3])),
-        Change::EndSlip => {
+    let changed = fit.change.about().changed;
+    match changed.courses {
+        [Course::Ramp] => return Since::Gradual(moment(cells, [0.0; 3])),
+        [Course::Step] => {
             // Its law has the moment as a parameter, found to about a half-stroke.
             let begin = cells.rows.contexts().first().map_or(0.0, |c| c.time);
             let time = fit.parameters.iter().find(|p| p.1 == "s").map(|p| p.2 - begin);
@@ -115,7 +116,7 @@ fn since(cells: &Cells, fit: &Fit) -> Since {
             };
             return time.map_or(Since::NotDetermined, |at| Since::From(moment(cells, near(at))));
         }
-        change if change.remembers() => return Since::NotDetermined,
+        _ if changed.remembers => return Since::NotDetermined,
         _ => {}
     }
     let weigh = |factor: &dyn Fn(usize) -> f64| {
@@ -187,15 +188,15 @@ fn places(cells: &Cells) -> Vec<Place> {
 fn changed(cells: &Cells, accepted: &Accepted) -> Changed {
     let about = accepted.fit.change.about();
     let (alone, _) = unseen(cells, &[accepted]);
-    // The catalogue counts the pressure that the reading lacks, a change what the gauge reads too much.
-    let sign = if accepted.fit.change == Change::GaugeGain { -1.0 } else { 1.0 };
+    // The catalogue counts the pressure that a gauge lacks, a change what it reads too much.
+    let sign = if about.changed.correctable { accepted.fit.change.sign() } else { 1.0 };
     let parameters = accepted.fit.parameters.iter();
     Changed {
         change: accepted.fit.change,
         effect: about.name.into(),
         probability: accepted.probability,
         class_probability: accepted.class_probability,
-        class: accepted.fit.change.stroke_class(),
+        class: about.changed.class_in_strokes,
         share_explained: alone.share().clamp(0.0, 1.0),
         parameters: parameters
             .map(|(name, unit, value, std)| size((name, unit), sign * *value, *std, 1e6, CATALOGUE_LAW_ERROR))

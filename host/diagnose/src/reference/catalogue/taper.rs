@@ -11,8 +11,7 @@
 
 use std::f64::consts::PI;
 
-use model_core::effects::{Context, EffectName};
-use pam_fit::bench;
+use model_core::effects::{Context, FurtherLaw};
 
 use crate::candidates::Candidate;
 use crate::rows::Rows;
@@ -22,7 +21,7 @@ pub(super) const PARAMETER: (&str, &str) = ("taper_slant", "");
 
 /// Whether this law is one of the candidate's.
 pub(super) fn belongs(candidate: &Candidate) -> bool {
-    candidate.is(bench::Candidate::Muscle(EffectName::TipEffect))
+    candidate.traits.changed.is_some_and(|c| c.further == Some(FurtherLaw::TaperSlant))
 }
 
 /// `F_add / k_s` in one moment, N.

@@ -249,13 +249,17 @@ impl Round {
     }
 
     fn class(&self, class: Class) -> f64 {
-        self.fits.iter().filter(|(f, _)| f.change.stroke_class() == class).map(|(_, p)| p).sum()
+        self.fits
+            .iter()
+            .filter(|(f, _)| f.change.about().changed.class_in_strokes == class)
+            .map(|(_, p)| p)
+            .sum()
     }
 
     /// The best name of the class that is more probable than not; or of the names with one trace that together are, where the recordings do
     /// not say which it is.
     fn leader(&self) -> Option<Accepted> {
-        let class = |i: &usize| self.class(self.fits[*i].0.change.stroke_class());
+        let class = |i: &usize| self.class(self.fits[*i].0.change.about().changed.class_in_strokes);
         let together = |i: &usize| self.alike[*i].iter().map(|k| self.fits[*k].1).sum::<f64>();
         let best = |support: &dyn Fn(&usize) -> f64| {
             let of = (0..self.fits.len()).filter(|i| support(i) >= NAMED);
@@ -292,8 +296,8 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
     let mut round = first;
     while accepted.len() < MOST_CHANGES {
         let Some(next) = round.leader().filter(|_| round.none < NAMED) else { break };
-        let class = next.fit.change.stroke_class();
-        if accepted.iter().any(|a| a.fit.change.stroke_class() == class) {
+        let class = next.fit.change.about().changed.class_in_strokes;
+        if accepted.iter().any(|a| a.fit.change.about().changed.class_in_strokes == class) {
             break;
         }
         taken.extend(next.fit.columns.iter().cloned());
@@ -308,6 +312,10 @@ pub(super) fn weigh(cells: &Cells, none: f64) -> Weighed {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn change(name: &str) -> Change {
+        Change::from_name(name).expect("listed")
+    }
 
     fn round(of: &[(Change, f64)], alike: &[usize]) -> Round {
         let fit = |(change, p): &(Change, f64)| {
@@ -333,17 +341,16 @@ mod tests {
 
     #[test]
     fn names_with_one_trace_lead_together() {
-        let permanent = Change::from_name("permanent-set").expect("listed");
-        let shifts = [(Change::DisplacementOffset, 0.39), (Change::EndSlip, 0.35), (permanent, 0.26)];
+        let [moved, slipped, permanent] = ["displacement-offset", "end-slip", "permanent-set"].map(change);
+        let shifts = [(moved, 0.39), (slipped, 0.35), (permanent, 0.26)];
         let named = round(&shifts, &[0, 1, 2]).leader().expect("a name");
-        assert_eq!(named.fit.change, Change::DisplacementOffset);
-        assert_eq!(named.competitors, [Change::EndSlip, permanent]);
+        assert_eq!(named.fit.change, moved);
+        assert_eq!(named.competitors, [slipped, permanent]);
         // Each with a trace of its own: none of them is more probable than not.
         assert!(round(&shifts, &[]).leader().is_none());
         // A class that leads goes before names of one trace.
-        let classes =
-            [(Change::CoulombFriction, 0.3), (Change::PressureFriction, 0.3), (Change::EndSlip, 0.4)];
+        let classes = [(change("coulomb-friction"), 0.3), (change("pressure-friction"), 0.3), (slipped, 0.4)];
         let named = round(&classes, &[0, 2]).leader().expect("a name");
-        assert_eq!(named.fit.change.stroke_class(), Class::Friction);
+        assert_eq!(named.fit.change.about().changed.class_in_strokes, Class::Friction);
     }
 }
