@@ -1,6 +1,6 @@
-//! A low-pass filter that force, pressure and stroke passed through alike.
+//! A low-pass filter that force, pressure and stroke all passed through.
 //!
-//! Friction changes its sign where the muscle turns. In filtered recordings the stroke turns smoothly, and the force passes over to the
+//! Friction changes its sign at a reversal. In filtered recordings the stroke turns smoothly, and the force passes over to the
 //! other branch within the time of the filter, from before the recorded reversal to behind it ([`law`]). No friction of a muscle begins to
 //! turn before the muscle does: that distinguishes a filter from presliding, backlash and lags, which the same rows are compared with. In
 //! rows about a reversal a filter mixes both directions of friction. They would be taken for one of these effects, and no longer count.

@@ -1,4 +1,4 @@
-//! Clean recordings that a logger or a person has processed: filtered, thinned, rounded, or noisy. No processing is physics: every name is a
+//! Clean recordings that were processed after the measurement: filtered, thinned, rounded, or noisy. No processing is physics: every name is a
 //! false alarm.
 
 use crate::answer::{Answer, recordings};
@@ -238,8 +238,8 @@ pub fn run(what: &Processed) -> Result<(), Box<dyn Error>> {
 
 /// Beginning of the page.
 const INTRODUCTION: &str = "# Trials of processed recordings\n\nWritten by `cargo run --release -p trials -- processed -o DIR --page \
-    docs/src/proof-processed.md`; nothing here is typed by hand. Recordings of clean muscles of the virtual bench, at 10 rows a second, as a \
-    logger or a person may have processed them. Nothing is left out of the model: every name is a false alarm. Filters, rounding and missing \
+    docs/src/proof-processed.md`; nothing here is typed by hand. Recordings of clean muscles of the virtual bench, at 10 rows a second, \
+    processed as loggers and users do. Nothing is left out of the model: every name is a false alarm. Filters, rounding and missing \
     rows apply to pressure, displacement and force together. Noise and steps are shares of a column's range. Rates have exact 95 % intervals \
     in brackets. For filtered recordings the answer has a remark with the time over which friction turns in them.\n\n";
 
