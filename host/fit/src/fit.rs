@@ -57,6 +57,7 @@ pub(crate) mod smoothing;
 pub(crate) mod solution;
 mod solve;
 pub(crate) mod summary;
+pub(crate) mod table_friction;
 pub(crate) mod uncertainty;
 mod warnings;
 mod weights;

@@ -83,5 +83,6 @@ pub use fit::screen::{Clip, Outlier, PointUse, Screen, clip};
 pub use fit::smoothing::Smoothing;
 pub use fit::solution::Solution;
 pub use fit::summary::{AtPressure, ModelError, OutlierRow, PhysicalCost, RowUse, Summary};
+pub use fit::table_friction::with_friction;
 pub use fit::uncertainty::{Uncertain, table_root};
 pub use fit::{Options, fit, fit_with_progress, table_alone};

@@ -21,7 +21,7 @@ use pam_data::statistics::median;
 use pam_fit::error::FitCode;
 use pam_fit::numerics::spline_basis::SplineBasis;
 use pam_fit::table_file::{TableFile, Uncertainty};
-use pam_fit::{Columns, Fit, Options, PointUse, columns, fit};
+use pam_fit::{Columns, Fit, Options, PointUse, columns, fit, with_friction};
 
 /// Fewer kin do not determine a covariance: the factor `(n − 1)/(n − 3)` of Student's distribution has a meaning from 4 on, and is 2 at 5.
 pub(crate) const FEWEST: usize = 5;
@@ -292,7 +292,6 @@ fn table(prior: &Prior, theta: &DVector<f64>, kin: &[&TableFile], alone: &Fit) -
     table.deadband = Pressure::from_pascals(theta[0] as f32);
     table.nodes = prior.nodes.iter().map(|p| *p as f32).collect();
     table.elastic = (0..prior.order).map(|k| curve(1 + k * nodes).map(|e| *e as f32).collect()).collect();
-    table.friction = curve(1 + prior.order * nodes).map(|k| k.clamp(-0.5, 0.95) as f32).collect();
     let tested = &mut table.tested;
     tested.pressure_low = Pressure::from_pascals(prior.nodes[0] as f32);
     tested.pressure_high = Pressure::from_pascals(prior.nodes[nodes - 1] as f32);
@@ -302,6 +301,8 @@ fn table(prior: &Prior, theta: &DVector<f64>, kin: &[&TableFile], alone: &Fit) -
     let unusable = |what: String| {
         Error::new(FitCode::FitUnderdetermined, format!("the stock gives no usable table: {what}"))
     };
+    let friction: Vec<f64> = curve(1 + prior.order * nodes).copied().collect();
+    let mut table = with_friction(table, &friction).map_err(|e| unusable(e.to_string()))?;
     let built = Muscle::<f64>::build(&table).map_err(|e| unusable(e.to_string()))?;
     let highest = Pressure::from_pascals(prior.nodes[nodes - 1]);
     let blocked = built.force(highest, Length::from_metres(0.0), 0.0).newtons();

@@ -19,6 +19,7 @@ use super::midline::{MidPoint, midline};
 use super::models::{self, Model};
 use super::solution::Solution;
 use super::summary::{ModelError, Results, Summary, summarise};
+use super::table_friction::with_friction;
 use super::uncertainty::{Uncertain, jackknife, table_root};
 use crate::numerics::covariance_root::CovarianceRoot;
 
@@ -177,7 +178,7 @@ pub(super) fn table(solution: &Solution, muscle: &MuscleDescription) -> Result<M
         goes_slack: solution.screen.goes_slack,
         nodes: nodes.iter().map(|p| *p as f32).collect(),
         elastic,
-        friction: at.iter().map(|(_, k)| k.clamp(-0.5, 0.95) as f32).collect(),
+        friction: heapless::Vec::new(),
         tested: Tested {
             pressure_low: Pressure::from_pascals(range.low as f32),
             pressure_high: Pressure::from_pascals(range.high as f32),
@@ -188,8 +189,8 @@ pub(super) fn table(solution: &Solution, muscle: &MuscleDescription) -> Result<M
         blocked_force: Force::from_newtons(solution.blocked(highest) as f32),
         effects: heapless::Vec::new(),
     };
-    table.check().map_err(|e| unusable(&e.to_string()))?;
-    Ok(table)
+    let friction: Vec<f64> = at.iter().map(|(_, k)| *k).collect();
+    with_friction(table, &friction).map_err(|e| unusable(&e.to_string()))
 }
 
 /// `F − F_model` of every point by the table itself, as the controller would have it, N.
