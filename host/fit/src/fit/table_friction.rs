@@ -2,8 +2,9 @@
 
 use model_core::table::{MuscleTable, TableError};
 
-/// Limits of `k_F` at the nodes of a table, and by how much they are drawn in at a time until the curve between the nodes stays within them.
-const LIMITS: (f64, f64) = (-0.5, 0.95);
+/// Limits of `k_F` at the nodes of a table.
+pub(super) const LIMITS: (f64, f64) = (-0.5, 0.95);
+/// By how much they are drawn in at a time, until the curve between the nodes stays within them, and how often at most.
 const DRAWN_IN: f64 = 0.02;
 const MOST_TIMES: u32 = 20;
 

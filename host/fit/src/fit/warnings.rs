@@ -3,6 +3,7 @@
 use super::problem::Problem;
 use super::screen::PointUse;
 use super::solution::Solution;
+use super::table_friction::LIMITS;
 use super::weights::scatter;
 
 use pam_data::pluralise::pluralise;
@@ -225,6 +226,13 @@ fn friction(solution: &Solution, out: &mut Vec<String>) {
             levels.iter().zip(&factors).map(|(p, k)| (k * solution.blocked(*p)).abs()).fold(0.0, f64::max);
         if largest < 0.5 * noise {
             out.push("no hysteresis above the noise: k_F is zero within its uncertainty".into());
+        }
+        if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k > LIMITS.1) {
+            out.push(format!(
+                "k_F is {k:.2} at {:.0} kPa: no friction is as large as the force, and the table holds {} at most. Something else resists the \
+                 motion: `host diagnose` looks for it",
+                p / 1e3, LIMITS.1
+            ));
         }
         if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k < -0.01) {
             let check = if points.held_lengths().is_empty() {
