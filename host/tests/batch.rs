@@ -29,7 +29,7 @@ fn host(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 fn answer(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout).unwrap()
+    published_schemas::valid(std::str::from_utf8(&output.stdout).unwrap())
 }
 
 /// Loops of the miniature muscle at three pressures, a few hundred rows; each seed is another muscle's recording.

@@ -114,8 +114,7 @@ fn every_json_names_its_schema() {
         ("emulate --quiet --on native --seconds 0.01 --json", "pam-emulate/1"),
     ] {
         let (status, said) = host(folder.path(), &call.split(' ').collect::<Vec<_>>(), None);
-        let value: serde_json::Value =
-            serde_json::from_str(&said).unwrap_or_else(|e| panic!("{call}: {e}: {said}"));
+        let value = published_schemas::valid(&said);
         assert_eq!((status, value["schema"].as_str()), (0, Some(schema)), "{call}: {said}");
     }
 }

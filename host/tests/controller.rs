@@ -236,7 +236,9 @@ fn traced(bench: &Bench, variables: &str) -> serde_json::Value {
     bench.broken("traced.csv");
     let said = bench.done(&["device", "trace", "--read", "--json"]);
     bench.mend();
-    serde_json::Deserializer::from_str(&said).into_iter().next().unwrap().unwrap()
+    let first: serde_json::Value =
+        serde_json::Deserializer::from_str(&said).into_iter().next().unwrap().unwrap();
+    published_schemas::valid(&first.to_string())
 }
 
 #[test]
@@ -313,7 +315,7 @@ fn settings_are_read_back_and_wrong_ones_refused_by_name() {
 fn a_sensor_is_calibrated_with_known_values_and_a_recording_holds_its_scale() {
     let bench = Bench::start("sensors");
     let force = |said: &str| {
-        let said: serde_json::Value = serde_json::from_str(said).unwrap();
+        let said = published_schemas::valid(said);
         let row = said["sensors"].as_array().unwrap().iter().find(|row| row["sensor"] == "force").unwrap();
         row["reading"].as_f64().unwrap()
     };
@@ -384,7 +386,7 @@ fn the_demo_shows_the_whole_workflow() {
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let answer = published_schemas::valid(std::str::from_utf8(&output.stdout).unwrap());
     let share = |law: usize| answer["tracking"][law]["sine_rms_pct"].as_f64().unwrap();
     assert_eq!(answer["tracking"][0]["feed_forward"], "table");
     assert!(share(0) < 2.0 && share(1) > 10.0, "{answer}");

@@ -30,7 +30,7 @@ fn write(folder: &Folder, name: &str, table: MuscleTable) {
 }
 
 fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+    published_schemas::valid(text)
 }
 
 fn number(value: &Value) -> f64 {

@@ -92,7 +92,7 @@ fn after_a_run(sensors: Sensors) -> (TableHealth, serde_json::Value, String) {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
-    let document = serde_json::from_str(&asked(&["health", "--json"])).expect("JSON");
+    let document = published_schemas::valid(&asked(&["health", "--json"]));
     (state, document, asked(&["health"]))
 }
 

@@ -12,6 +12,22 @@ use std::path::Path;
 
 use serde_json::Value;
 
+/// The document that a command printed, which is valid by the schema that it names.
+///
+/// # Panics
+/// The text is no JSON, names no published schema, or is invalid.
+#[must_use]
+#[allow(clippy::panic, reason = "for tests")]
+pub fn valid(text: &str) -> Value {
+    let document: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    let schemas = Schemas::read().unwrap_or_else(|e| panic!("docs/schema: {e}"));
+    match schemas.check(&document) {
+        Ok(errors) if errors.is_empty() => document,
+        Ok(errors) => panic!("invalid: {errors:#?}"),
+        Err(error) => panic!("{error}: {text}"),
+    }
+}
+
 /// All published schemas by name, such as `pam-fit/1`.
 pub struct Schemas(BTreeMap<String, Value>);
 
