@@ -18,6 +18,9 @@ pam_data::criteria! {
     SPIKE_CHANGE: f64 = 3.0, "n_change", "1", Derived("where an even motion turns, the median of five is two changes away");
     /// Readings about one of pressure or stroke through which a line is laid, to take the noise of the sensor away; odd.
     SMOOTHED: ([usize; 3]) = [31, 15, 7], "n_line", "1", Cost;
+    /// The smoothing stops at reversals, unless more than one of this many successive displacements are equal: then the steps of the converter
+    /// round the reversal anyway.
+    STEPPED_REPEATS: usize = 2, "1/q_stepped", "1", Judgement;
     /// They scatter as the sensor does where their variance about the line is below this quantile, in standard deviations of a normal value.
     SMOOTHED_QUANTILE: f64 = 1.645, "z_line", "1", Convention("95 %");
     /// Spikes are mentioned where they are more than one of this many readings.

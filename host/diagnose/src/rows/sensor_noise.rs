@@ -4,7 +4,7 @@
 //! force, and any effect that smooths this force explains a part of it: a filter in the force channel above all. (It is the problem of errors
 //! in the variables: W. A. Fuller, Measurement Error Models, Wiley 1987, section 1.2.)
 
-use crate::criteria::rows::{SMOOTHED, SMOOTHED_QUANTILE};
+use crate::criteria::rows::{SMOOTHED, SMOOTHED_QUANTILE, STEPPED_REPEATS};
 use pam_data::recording::white_noise;
 
 /// Pressures without the part of their scatter that the force does not follow. `pull` is the force per pressure, m².
@@ -13,9 +13,11 @@ pub(super) fn smoothed_pressure(pressure: &[f64], force: &[f64], pull: f64) -> V
 }
 
 /// Strokes without the scatter of their sensor. No muscle moves back and forth from reading to reading. Across a reversal nothing is
-/// averaged: a rounded corner would look like a force that comes late.
+/// averaged: a rounded corner would look like a force that comes late. Where most readings equal the one before, they are steps of a converter.
 pub(super) fn smoothed_stroke(stroke: &[f64], reversals: &[usize]) -> Vec<f64> {
-    smooth(stroke, white_noise(stroke), 0.0, reversals)
+    let equal = stroke.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let stepped = equal * STEPPED_REPEATS > stroke.len();
+    smooth(stroke, white_noise(stroke), 0.0, if stepped { &[] } else { reversals })
 }
 
 /// The share of the pressure's fast scatter that the muscle feels: where the regulator makes it, the force follows; where the sensor makes
