@@ -3,7 +3,7 @@
 //!
 //! Friction of the muscles has several sets of bristles, so that it turns over a wide range of pressure after a reversal.
 
-use crate::answer::{Answer, Missing, recordings};
+use crate::answer::{Answer, Missing};
 use crate::generate;
 use crate::names::{SINGLES, class};
 use crate::progress::Progress;
@@ -18,7 +18,6 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use virtual_bench::presets;
-use virtual_bench::recording::Columns;
 
 /// How many muscles, and where the page goes.
 #[derive(clap::Args)]
@@ -183,17 +182,7 @@ impl Answered<'_> {
 fn ask(what: &Held, residuals: &Residuals, case: &Case) -> Result<(Answer, f64), String> {
     let dir = what.output.join(case.name());
     let trial = generate::make(&case.spec, residuals);
-    std::fs::create_dir_all(&dir).map_err(|e| format!("{}: {e}", dir.display()))?;
-    let put = |name: &str, text: &str| {
-        let path = dir.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-    };
-    put("muscle.toml", &trial.description)?;
-    for r in &trial.recordings {
-        put(&format!("{}.csv", r.name), &r.csv(Columns::default()))?;
-    }
-    let answer =
-        tool::answer(&what.host, &dir, &recordings(&dir)).map_err(|e| format!("{}: {e}", dir.display()))?;
+    let answer = tool::answer_to(&what.host, &dir, &trial)?;
     let effect = trial.truth.effects.first();
     let peak = effect.map_or(0.0, |e| 0.01 * e.amplitude_pct * trial.truth.blocked_force);
     Ok((answer, peak))

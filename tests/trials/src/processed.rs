@@ -1,7 +1,7 @@
 //! Clean recordings that were processed after the measurement: filtered, thinned, rounded, or noisy. No processing is physics: every name is a
 //! false alarm.
 
-use crate::answer::{Answer, recordings};
+use crate::answer::Answer;
 use crate::generate;
 use crate::progress::Progress;
 use crate::queue::in_order;
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use virtual_bench::recording::{Columns, Recording, Row};
+use virtual_bench::recording::{Recording, Row};
 use virtual_bench::rng::Rng;
 
 /// How many muscles, and where the page goes.
@@ -161,16 +161,7 @@ impl<'a> Case<'a> {
         let dir = what.output.join(folder);
         let mut trial = generate::make(&self.spec, residuals);
         self.process(&mut trial.recordings);
-        std::fs::create_dir_all(&dir).map_err(|e| format!("{}: {e}", dir.display()))?;
-        let put = |name: &str, text: &str| {
-            let path = dir.join(name);
-            std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-        };
-        put("muscle.toml", &trial.description)?;
-        for r in &trial.recordings {
-            put(&format!("{}.csv", r.name), &r.csv(Columns::default()))?;
-        }
-        tool::answer(&what.host, &dir, &recordings(&dir)).map_err(|e| format!("{}: {e}", dir.display()))
+        tool::answer_to(&what.host, &dir, &trial)
     }
 
     fn process(&self, files: &mut [Recording]) {
