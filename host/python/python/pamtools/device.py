@@ -110,7 +110,8 @@ class Device:
         """Follows a setpoint profile of one quantity and iterates over its :class:`Sample` values.
 
         ``seconds`` is the length in time of the device (default: until the loop is left), ``rate`` the number of samples per second. A
-        setpoint that the muscle cannot reach by its table is refused unless ``beyond`` is true.
+        setpoint that the muscle cannot reach by its table is refused unless ``beyond`` is true. The first samples may have been taken
+        before the setpoint reached the controller: they have the setpoint that it held until then.
         """
         self._begin(force, pressure, stroke, angle, stiffness, seconds, rate, beyond)
         return self._samples()
