@@ -7,8 +7,6 @@ use std::process::Command;
 
 use pam_device::emulated::{Emulated, Kind, Stand};
 use pam_device::recorder::side_file;
-use published_schemas::Schemas;
-use serde_json::Value;
 use virtual_bench::presets;
 use virtual_bench::recording::Columns;
 
@@ -29,11 +27,8 @@ fn host(folder: &Path, arguments: &[&str]) -> String {
 }
 
 /// The name of a document's schema, by which it has to be valid.
-fn valid(all: &Schemas, call: &str, text: &str) -> String {
-    let document: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{call}: {e}: {text}"));
-    let errors = all.check(&document).unwrap_or_else(|e| panic!("{call}: {e}"));
-    assert!(errors.is_empty(), "{call}: invalid: {errors:#?}");
-    document["schema"].as_str().unwrap().replace('/', "-")
+fn schema_of(text: &str) -> String {
+    published_schemas::valid(text)["schema"].as_str().unwrap().replace('/', "-")
 }
 
 /// Loops of the miniature muscle at three pressures, with its description.
@@ -52,7 +47,6 @@ fn campaign(folder: &Path) -> Vec<String> {
 
 #[test]
 fn results_of_recordings_and_tables_are_valid() {
-    let all = Schemas::read().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let recordings = campaign(folder);
@@ -67,7 +61,7 @@ fn results_of_recordings_and_tables_are_valid() {
         if with {
             words.extend(recordings.iter().map(String::as_str));
         }
-        valid(&all, call, &host(folder, &words))
+        schema_of(&host(folder, &words))
     };
     let mut seen = vec![
         own("fit --quiet --muscle m.toml -o t.pam --json -", true),
@@ -109,7 +103,7 @@ fn results_of_recordings_and_tables_are_valid() {
     own(&format!("diagnose --quiet {} --reference {} --json -", of(second), of(first)), false);
     own(&format!("diagnose --quiet {} --reference t.pam --json -", of(second)), false);
     let (a, b) = (&recordings[0], &recordings[1]);
-    seen.push(valid(&all, "compare", &host(folder, &["compare", "--quiet", a, b, "--json"])));
+    seen.push(schema_of(&host(folder, &["compare", "--quiet", a, b, "--json"])));
     seen.sort();
     seen.dedup();
     assert_eq!(seen.len(), 15, "{seen:?}");
@@ -117,7 +111,6 @@ fn results_of_recordings_and_tables_are_valid() {
 
 #[test]
 fn results_of_a_controller_are_valid() {
-    let all = Schemas::read().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let stand = Stand::swinging(presets::miniature());
@@ -139,10 +132,10 @@ fn results_of_a_controller_are_valid() {
         "vent --json",
     ] {
         let words: Vec<&str> = call.split(' ').chain(["--port", &port]).collect();
-        valid(&all, call, &host(folder, &words));
+        schema_of(&host(folder, &words));
     }
     for recording in ["watched.csv", "run.csv"] {
         let side = side_file(&folder.join(recording));
-        valid(&all, recording, &std::fs::read_to_string(side).unwrap());
+        schema_of(&std::fs::read_to_string(side).unwrap());
     }
 }

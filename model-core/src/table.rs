@@ -185,8 +185,9 @@ impl MuscleTable {
                 return Err(TableError::Elastic(k as u8 + 1));
             }
         }
-        let (least, most) = FRICTION;
-        if !is_curve(&self.friction, count, least, most) || !stays(&self.nodes, &self.friction, FRICTION) {
+        let (least, most) = FRICTION_LIMITS;
+        let within = is_curve(&self.friction, count, least, most);
+        if !within || !stays(&self.nodes, &self.friction, FRICTION_LIMITS) {
             return Err(TableError::Friction);
         }
         let t = &self.tested;
@@ -220,8 +221,8 @@ impl MuscleTable {
 /// The largest elastic coefficient that is taken for one, Pa.
 const STIFFEST: f32 = 1.0e13_f32.next_down();
 
-/// Limits of `k_F`.
-const FRICTION: (f32, f32) = (-0.5, 0.95);
+/// Limits of `k_F`, at the nodes of a table and between them.
+pub const FRICTION_LIMITS: (f32, f32) = (-0.5, 0.95);
 
 /// Highest pressure that any number of a table may be, Pa: a thousand times what a muscle bears.
 const HIGHEST: f32 = 1.0e9;

@@ -27,9 +27,9 @@ fn energy(rows: &Rows, fitted: &Baseline, turns: &[&Turn], law: Law) -> f64 {
         turns.iter().map(|turn| turn.energy(rows, fitted, time(turn), law)).sum()
     };
     match law {
-        Law::Filter { .. } | Law::AsSpeed { .. } => at(&|turn| turn.meets),
+        Law::Filter { .. } | Law::AsSpeed(_) => at(&|turn| turn.meets),
         // A motor that slows down before it turns, and one that does not.
-        Law::Sharp { .. } | Law::AfterTime(_) | Law::AfterTravel(_) => {
+        Law::Sharp(_) | Law::AfterTime(_) | Law::AfterTravel(_) => {
             at(&|turn| turn.meets).min(at(&|turn| turn.farthest))
         }
     }

@@ -238,6 +238,30 @@ fn thin_data_are_fitted_with_a_word_of_warning() {
     assert!(fitted.table.friction.iter().all(|k| k.abs() < 1e-6));
 }
 
+/// A seal or a guide beside the muscle, which resists by the same force at all pressures; then the same force against all friction.
+#[test]
+fn friction_that_no_muscle_has_is_warned_of_and_the_table_is_valid() {
+    let spec = presets::miniature();
+    let clean = thesis(&spec, &presets::miniature_pressures(), 5, 15.0);
+    let with_resistance = |newtons: f64| {
+        let mut campaign = clean.clone();
+        for recording in &mut campaign.recordings {
+            let steps: Vec<f64> = recording.stroke.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let force = recording.force.as_mut().expect("a force");
+            force.iter_mut().skip(1).zip(steps).for_each(|(f, step)| *f -= newtons * step.signum());
+        }
+        let fitted = fit(&campaign, &description(&spec), &Options::default()).expect("a fit");
+        assert_eq!(fitted.table.check(), Ok(()));
+        fitted
+    };
+    let warns = |fitted: &Fit, of: &str| fitted.summary.warnings.iter().any(|w| w.contains(of));
+    let (usual, resists, drives) = (with_resistance(0.0), with_resistance(30.0), with_resistance(-10.0));
+    let (absurd, negative) = ("the table holds 0.95 at most", "below zero, which no friction is");
+    assert!(!warns(&usual, absurd) && !warns(&usual, negative), "{:?}", usual.summary.warnings);
+    assert!(warns(&resists, absurd) && !warns(&resists, negative), "{:?}", resists.summary.warnings);
+    assert!(warns(&drives, negative) && !warns(&drives, absurd), "{:?}", drives.summary.warnings);
+}
+
 #[test]
 fn a_spike_is_found_listed_and_does_no_harm() {
     let spec = presets::miniature();

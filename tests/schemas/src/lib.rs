@@ -9,6 +9,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use serde_json::Value;
 
@@ -20,10 +21,11 @@ use serde_json::Value;
 #[allow(clippy::panic, reason = "for tests")]
 pub fn valid(text: &str) -> Value {
     let document: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"));
-    let schemas = Schemas::read().unwrap_or_else(|e| panic!("docs/schema: {e}"));
+    static ALL: OnceLock<Schemas> = OnceLock::new();
+    let schemas = ALL.get_or_init(|| Schemas::read().unwrap_or_else(|e| panic!("docs/schema: {e}")));
     match schemas.check(&document) {
         Ok(errors) if errors.is_empty() => document,
-        Ok(errors) => panic!("invalid: {errors:#?}"),
+        Ok(errors) => panic!("{} is invalid: {errors:#?}", document["schema"]),
         Err(error) => panic!("{error}: {text}"),
     }
 }

@@ -18,19 +18,13 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Law {
     /// Within no time, later than the stroke by this, s; earlier where negative.
-    Sharp {
-        /// See the law.
-        late: f64,
-    },
+    Sharp(f64),
     /// Behind the reversal, by a time constant, s.
     AfterTime(f64),
     /// Behind the reversal, by a travel, m.
     AfterTravel(f64),
     /// Through any filter, between strokes at constant speed. The speed is that from the row before to the row this far ahead.
-    AsSpeed {
-        /// See the law.
-        ahead: usize,
-    },
+    AsSpeed(usize),
     /// Through a filter of this form.
     Filter {
         /// Its response to a step.
@@ -98,22 +92,16 @@ pub(super) struct Place {
 impl Law {
     /// Every law without a filter of all channels, with these widths, s; travels are those at a speed, m/s.
     pub(super) fn unfiltered(widths: &[f64], speed: f64) -> Vec<Self> {
-        let of = |w: &f64| {
-            [
-                Self::Sharp { late: *w },
-                Self::Sharp { late: -w },
-                Self::AfterTime(*w),
-                Self::AfterTravel(w * speed),
-            ]
-        };
-        std::iter::once(Self::Sharp { late: 0.0 }).chain(widths.iter().flat_map(of)).collect()
+        let of =
+            |w: &f64| [Self::Sharp(*w), Self::Sharp(-w), Self::AfterTime(*w), Self::AfterTravel(w * speed)];
+        std::iter::once(Self::Sharp(0.0)).chain(widths.iter().flat_map(of)).collect()
     }
 
     /// Every law with one.
     pub(super) fn filters(widths: &[f64]) -> Vec<Self> {
         let of = |kernel: Kernel| widths.iter().map(move |width| Self::Filter { kernel, width: *width });
         let forms = Kernel::ALL.into_iter().flat_map(of);
-        forms.chain([Self::AsSpeed { ahead: 0 }, Self::AsSpeed { ahead: 1 }]).collect()
+        forms.chain([Self::AsSpeed(0), Self::AsSpeed(1)]).collect()
     }
 
     /// The same filter, wider by a factor.
@@ -130,10 +118,10 @@ impl Law {
         let Place { time, travel, speed } = place;
         let after = |u: f64| if time > 0.0 { 1.0 - (-u).exp() } else { 0.0 };
         match self {
-            Self::Sharp { late } => f64::from(u8::from(time > late)),
+            Self::Sharp(late) => f64::from(u8::from(time > late)),
             Self::AfterTime(over) => after(time / over),
             Self::AfterTravel(over) => after(travel / over),
-            Self::AsSpeed { .. } => speed,
+            Self::AsSpeed(_) => speed,
             Self::Filter { kernel, width } => kernel.response(time / width + kernel.delay()),
         }
     }

@@ -62,7 +62,7 @@ impl Turn {
     pub(super) fn friction(&self, rows: &Rows, i: usize, time: f64, law: Law) -> f64 {
         let stroke = |i: usize| rows.contexts()[i].stroke;
         let direction = rows.sign[self.at];
-        let next = if let Law::AsSpeed { ahead } = law { i + ahead } else { i };
+        let next = if let Law::AsSpeed(ahead) = law { i + ahead } else { i };
         let speed = (stroke(next) - stroke(i - 1)) / (rows.local_time[next] - rows.local_time[i - 1]);
         let change = (speed - self.speeds[0]) / (self.speeds[1] - self.speeds[0]);
         let place = Place {
@@ -105,7 +105,7 @@ fn line(rows: &Rows, part: Range<usize>) -> [f64; 2] {
 fn farthest(rows: &Rows, at: usize) -> (f64, f64) {
     let (time, stroke) = (|i: usize| rows.local_time[i], |i: usize| rows.contexts()[i].stroke);
     let nearer = |a: &usize, b: &usize| (stroke(*b) * rows.sign[at]).total_cmp(&(stroke(*a) * rows.sign[at]));
-    let Some(row) = (at - 2..=at + 1).max_by(nearer) else { return (time(at), stroke(at)) };
+    let row = (at - 2..=at + 1).max_by(nearer).unwrap_or(at);
     let slope = |i: usize| ((stroke(i) - stroke(row)) / (time(i) - time(row)), time(i) - time(row));
     let ((left, before), (right, after)) = (slope(row - 1), slope(row + 1));
     let curvature = (right - left) / (after - before);

@@ -44,9 +44,8 @@ fn smooth(series: &[f64], scatter: f64, felt: f64, reversals: &[usize]) -> Vec<f
     if !(scatter > 0.0) {
         return smoothed;
     }
-    let limit = |half: usize| scatter * scatter * chi_squared_over_degrees((2 * half + 1) as f64 - 2.0);
-    let usual = SMOOTHED.map(|n| (n / 2, limit(n / 2)));
-    let near: Vec<f64> = (0..SMOOTHED[SMOOTHED.len() - 1] / 2).map(|half| limit(half.max(1))).collect();
+    let usual = SMOOTHED.map(|n| n / 2);
+    let narrowest = usual[usual.len() - 1];
     let mut legs = reversals.iter().copied().chain([series.len()]).peekable();
     let mut leg = 0..0;
     for (i, value) in smoothed.iter_mut().enumerate() {
@@ -54,12 +53,11 @@ fn smooth(series: &[f64], scatter: f64, felt: f64, reversals: &[usize]) -> Vec<f
             leg = leg.end..end;
         }
         let room = (i - leg.start).min(leg.end - 1 - i);
-        let narrow = near.get(room).filter(|_| room > 0).map(|limit| (room, *limit));
-        let windows = || usual.into_iter().filter(|(half, _)| *half <= room).chain(narrow);
-        let narrowest = windows().last().map_or(0, |(half, _)| half);
-        for (half, limit) in windows() {
+        let narrow = (1..narrowest).contains(&room).then_some(room);
+        for half in usual.into_iter().filter(|half| *half <= room).chain(narrow) {
             let (mean, variance) = about_line(&series[i - half..=i + half]);
-            if variance <= limit || half == narrowest {
+            let limit = scatter * scatter * chi_squared_over_degrees((2 * half - 1) as f64);
+            if variance <= limit || half <= narrowest {
                 let removed = (1.0 - felt) * (limit / variance).min(1.0);
                 *value -= removed * (*value - mean);
                 break;

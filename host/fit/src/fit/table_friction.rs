@@ -1,10 +1,8 @@
 //! The friction curve of a table, within the limits that a controller accepts.
 
-use model_core::table::{MuscleTable, TableError};
+use model_core::table::{FRICTION_LIMITS, MuscleTable, TableError};
 
-/// Limits of `k_F` at the nodes of a table.
-pub(super) const LIMITS: (f64, f64) = (-0.5, 0.95);
-/// By how much they are drawn in at a time, until the curve between the nodes stays within them, and how often at most.
+/// By how much the limits are drawn in at a time, until the curve between the nodes stays within them, and how often at most.
 const DRAWN_IN: f64 = 0.02;
 const MOST_TIMES: u32 = 20;
 
@@ -15,10 +13,11 @@ const MOST_TIMES: u32 = 20;
 /// # Errors
 /// What is wrong with the table.
 pub fn with_friction(mut table: MuscleTable, friction: &[f64]) -> Result<MuscleTable, TableError> {
+    let (least, most) = (f64::from(FRICTION_LIMITS.0), f64::from(FRICTION_LIMITS.1));
     let mut checked = Ok(());
     for times in 0..=MOST_TIMES {
         let inside = DRAWN_IN * f64::from(times);
-        let limited = |k: &f64| k.clamp(LIMITS.0 + inside, LIMITS.1 - inside) as f32;
+        let limited = |k: &f64| k.clamp(least + inside, most - inside) as f32;
         table.friction = friction.iter().map(limited).collect();
         checked = table.check();
         if checked != Err(TableError::Friction) {

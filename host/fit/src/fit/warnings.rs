@@ -3,9 +3,9 @@
 use super::problem::Problem;
 use super::screen::PointUse;
 use super::solution::Solution;
-use super::table_friction::LIMITS;
 use super::weights::scatter;
 
+use model_core::table::FRICTION_LIMITS;
 use pam_data::pluralise::pluralise;
 use pam_data::statistics::median;
 
@@ -227,11 +227,12 @@ fn friction(solution: &Solution, out: &mut Vec<String>) {
         if largest < 0.5 * noise {
             out.push("no hysteresis above the noise: k_F is zero within its uncertainty".into());
         }
-        if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k > LIMITS.1) {
+        if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k > f64::from(FRICTION_LIMITS.1)) {
             out.push(format!(
-                "k_F is {k:.2} at {:.0} kPa: no friction is as large as the force, and the table holds {} at most. Something else resists the \
+                "k_F is {k:.2} at {:.0} kPa: no friction is as large as the force, and the table holds {:.2} at most. Something else resists the \
                  motion: `host diagnose` looks for it",
-                p / 1e3, LIMITS.1
+                p / 1e3,
+                FRICTION_LIMITS.1
             ));
         }
         if let Some((p, k)) = levels.iter().zip(&factors).find(|(_, k)| **k < -0.01) {
