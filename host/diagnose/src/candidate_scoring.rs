@@ -11,7 +11,7 @@ use super::criteria::candidates::{
     REFINEMENT_STEPS, SYSTEMATIC_ROWS,
 };
 use super::likelihood::{Hypothesis, Products, Scale, Target, likelihood, likelihood_at};
-use super::linear::{add_scaled, dot, energy, weighted};
+use super::linear::{Sign, add_scaled, dot, energy, weighted};
 use super::rows::Rows;
 
 /// A baseline beside which candidates are scored.
@@ -79,8 +79,14 @@ impl<'a> Scorer<'a> {
         shapes: &[f64],
         rows: &Rows,
     ) -> (Vec<Vec<f64>>, Products, Vec<Vec<f64>>) {
-        let span = &self.base.span;
         let columns = candidate.columns(shapes, rows);
+        let (products, z) = self.products_of(&columns, rows);
+        (columns, products, z)
+    }
+
+    /// Inner products of columns with all other columns, and the columns with the hard ones projected out.
+    fn products_of(&self, columns: &[Vec<f64>], rows: &Rows) -> (Products, Vec<Vec<f64>>) {
+        let span = &self.base.span;
         let z: Vec<Vec<f64>> = columns
             .iter()
             .map(|c| {
@@ -104,7 +110,14 @@ impl<'a> Scorer<'a> {
                 products.gram[self.chosen.given + i].push(dot(&z[i], other));
             }
         }
-        (columns, products, z)
+        (products, z)
+    }
+
+    /// What a column of any amplitude leaves, N², where the bladder differs between pressures as much as a hypothesis has it.
+    pub(crate) fn left_with(&self, column: &[f64], rows: &Rows, prior: PriorDeviations) -> f64 {
+        let (products, _) = self.products_of(&[column.to_vec()], rows);
+        let w = likelihood_at(&self.scale, &self.target, &products, &[Sign::Free], 1, prior);
+        (w.before - w.gain).max(0.0)
     }
 
     /// Fits a candidate at given shapes; with its scores block by block where `whole`.

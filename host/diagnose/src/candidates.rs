@@ -2,6 +2,7 @@
 
 use model_core::effects::{Axis, Context, Imitates, Info, MEMORY, Parameter, Role, Traits, Vented};
 
+use super::beginnings::preceded;
 use super::criteria::candidates::{CHANGE_POINTS, LAW_ERROR, LOGARITHMIC_RANGE, RANGE_OVERSHOOT, SHAPE_GRID};
 use super::linear::Sign;
 use super::rows::{Rows, typical_step};
@@ -184,7 +185,17 @@ impl Candidate {
     /// Its force per unit of each amplitude, N, over the rows in order.
     pub(crate) fn columns(&self, shapes: &[f64], rows: &Rows) -> Vec<Vec<f64>> {
         let mut memory = [0.0; MEMORY];
-        let mut columns = self.law.columns(rows.contexts(), shapes, &mut memory);
+        let mut columns = if rows.beginning().concerns(self.info) {
+            let (contexts, is_row) = preceded(rows, self.info);
+            let mut columns = self.law.columns(&contexts, shapes, &mut memory);
+            for column in &mut columns {
+                let mut kept = is_row.iter();
+                column.retain(|_| kept.next() == Some(&true));
+            }
+            columns
+        } else {
+            self.law.columns(rows.contexts(), shapes, &mut memory)
+        };
         for (amplitude, column) in columns.iter_mut().enumerate() {
             let vented_too = read_when_vented(self.traits, amplitude);
             for (value, vented) in column.iter_mut().zip(&rows.vented) {

@@ -1,9 +1,10 @@
 //! The diagnosis of a campaign: screen, settle rest friction, select, locate, judge.
 
 use model_core::braid::{Braid, Geometry};
-use model_core::effects::Imitates;
+use model_core::effects::{Imitates, Info};
 
 use super::baselines::{self, Kind, PushedRows};
+use super::beginnings;
 use super::bench_checks::BenchChecks;
 use super::candidates::{Candidate, library};
 use super::confirmation::select_and_confirm;
@@ -190,6 +191,8 @@ fn select(
         known_effects::fitted(rows, &library, blocked, step, &given)
     };
     remarks.extend(selection.remarks.iter().cloned());
+    let selected: Vec<&Info> = selection.selected.iter().map(|s| library[s.fit.candidate].info).collect();
+    remarks.extend(beginnings::remarks(&selection.rows, &selected));
     if !selection.noise.from_repeats {
         remarks.push(Remark::NoRepeats);
     }

@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 use model_core::effects::{Experiment, Link, Start};
 
 use super::baselines::{self, Baseline, Kind, PriorDeviations};
+use super::beginnings;
 use super::candidate_fit::{self, CandidateFit};
 use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
@@ -27,7 +28,7 @@ use super::resolution;
 use super::rows::{ORDERS, Rows};
 use super::selection_step::{
     JointFit, SelectedEffect, Selection, best_of_each, competitors, is_selectable, model_weight, refit,
-    scan_step,
+    scan_step, weight_of_stiffening,
 };
 
 /// Selects the effects that are missing. Candidates in `refused` are scored and may compete, but are not selected.
@@ -54,6 +55,8 @@ struct Winner {
     gain: f64,
     /// Its competitors: candidate, weight against it (1), cosine with it.
     competitors: Vec<(usize, f64, f64)>,
+    /// The weight against it (1) of a bladder that stiffens with the pressure; zero where the base already allows that.
+    stiffening: f64,
     /// The base without effects, in the metric of its prior.
     metric: Baseline,
 }
@@ -131,6 +134,8 @@ impl<'a> ForwardSelection<'a> {
             excluded: refused.to_vec(),
             remarks: Vec::new(),
         };
+        let scorer = Scorer::new(&search.joint, search.scale);
+        search.rows = beginnings::settle(&search.rows, library, &scorer);
         search.energy_before = energy(&search.base_alone.residual);
         search.excess_energy = search.excess_of(search.energy_before);
         search
@@ -163,6 +168,10 @@ impl<'a> ForwardSelection<'a> {
             return ControlFlow::Continue(());
         }
         let winner = self.with_competitors(winner, p[at], &best, &scorer);
+        if winner.stiffening >= ALIKE {
+            self.let_bladder_stiffen(&winner.fit);
+            return ControlFlow::Continue(());
+        }
         if let Some(why) = self.too_many_competitors(&winner) {
             self.refuse(winner.fit.candidate, why);
             return ControlFlow::Break(());
@@ -180,12 +189,18 @@ impl<'a> ForwardSelection<'a> {
         scorer: &Scorer<'_>,
     ) -> Winner {
         let metric = baselines::fit(&self.rows, Kind::Soft(fit.prior), &[]);
-        let competitors = if self.library[fit.candidate].shown_by_check {
+        let shown = self.library[fit.candidate].shown_by_check;
+        let competitors = if shown {
             Vec::new()
         } else {
             competitors(&fit, best, self.library, &self.rows, scorer, &metric.span)
         };
-        Winner { gain: fit.gain, fit, p, competitors, metric }
+        let stiffening = if shown || self.rows.bladder_stiffens() {
+            0.0
+        } else {
+            weight_of_stiffening(&fit, self.library, &self.rows, scorer)
+        };
+        Winner { gain: fit.gain, fit, p, competitors, stiffening, metric }
     }
 
     /// Why an effect cannot be distinguished from the others.
@@ -198,6 +213,19 @@ impl<'a> ForwardSelection<'a> {
             .collect();
         (open.len() > MOST_COMPETITORS || model_weight(&winner.competitors) < CONFUSABLE)
             .then(|| Refusal::Competitors { share: self.of_rest(&winner.fit).min(1.0), others: open })
+    }
+
+    /// Lets the stiffness of the one bladder change with the pressure from now on.
+    ///
+    /// The base has one bladder for all pressures, and tables differ from it where the recordings require it. An effect is credited with the
+    /// differences that it explains. Where the simplest difference of all explains as much, the effect has to show what it adds to that.
+    fn let_bladder_stiffen(&mut self, effect: &CandidateFit) {
+        self.remarks.push(Remark::BladderStiffens(self.library[effect.candidate].name().to_owned()));
+        let rows = self.rows.with_stiffening_bladder();
+        let joint = refit(&rows, self.kind, self.chosen.clone(), self.library);
+        self.joined(joint);
+        self.base_alone = baselines::fit(&self.rows, self.kind, &[]);
+        self.first_scan = None;
     }
 
     fn refuse(&mut self, candidate: usize, why: Refusal) {
@@ -343,7 +371,7 @@ impl<'a> ForwardSelection<'a> {
         self.scale.sigma = sigma.max(LEAST_SIGMA * self.blocked);
         self.excess_energy = self.excess_of(self.energy_before);
         let first = self.chosen.len() - winners.len();
-        for (at, Winner { fit, p, gain, competitors, metric }) in winners.into_iter().enumerate() {
+        for (at, Winner { fit, p, gain, competitors, metric, .. }) in winners.into_iter().enumerate() {
             let about = self.chosen[first + at].about.clone();
             self.base_alone = metric;
             // What is selected is not in its place.

@@ -16,6 +16,7 @@
 //! | | `rest_friction` | finds the law of friction at held length |
 //! | | `noise` | estimates noise from repeats; tests by whole blocks |
 //! | candidates | `candidates` | the library of effects as columns |
+//! | | `beginnings` | the state of the muscle at the beginning of a recording |
 //! | | `candidate_fit`, `candidate_scoring` | one candidate fitted beside a base; all of them scanned and refined |
 //! | | `renewed_laws` | memories of the turn, seen from a base that was fitted beside them |
 //! | | `likelihood` | how strongly the recordings support a candidate |
@@ -36,6 +37,7 @@
 //! Everything is computed in a fixed order with fixed seeds: the same recordings give the same answer on any number of threads.
 
 mod baselines;
+mod beginnings;
 mod bench_checks;
 mod calibration;
 mod candidate_fit;

@@ -107,6 +107,12 @@ pub enum Refusal {
 pub enum Remark {
     /// Beside a memory of the muscle, the static model between mountings leaves this error, N rms, without a name.
     StaticMisfit(f64),
+    /// Friction opposes the first stroke of each recording from its beginning, where this effect builds up after each reversal.
+    BeginsWithinStroke(String),
+    /// Each recording begins with a muscle that was just filled, for the memory of this effect.
+    BeginsJustFilled(String),
+    /// A bladder whose stiffness changes with the pressure explains what this effect would, and tables hold that.
+    BladderStiffens(String),
     /// The memory that was found goes into the table, as an effect of its own.
     MemoryInTable,
     /// Nothing can be judged.

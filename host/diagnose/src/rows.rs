@@ -18,6 +18,7 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
+use super::beginnings::Beginning;
 use super::criteria::rows::{ONE_SPEED, PRESSURE_TRIM, SPEED_TRIM, SPIKES_MENTIONED};
 use super::remark::Remark;
 use pam_data::error::Result;
@@ -124,6 +125,8 @@ pub(crate) struct Rows {
     root_weight: Arc<Vec<f64>>,
     rest_friction: Arc<RestFriction>,
     single_bladder: SingleBladder,
+    bladder_stiffens: bool,
+    beginning: Beginning,
     progress: SharedProgress,
 }
 
@@ -155,6 +158,14 @@ impl Rows {
     /// What one bladder for all pressures may do near full contraction.
     pub(crate) fn single_bladder(&self) -> SingleBladder {
         self.single_bladder
+    }
+    /// Whether the stiffness of one bladder for all pressures may change in proportion to the pressure.
+    pub(crate) fn bladder_stiffens(&self) -> bool {
+        self.bladder_stiffens
+    }
+    /// What is known of the muscle before the first row of a recording.
+    pub(crate) fn beginning(&self) -> Beginning {
+        self.beginning
     }
     /// Receives the progress of the work on them.
     pub(crate) fn progress(&self) -> &SharedProgress {
@@ -190,6 +201,14 @@ impl Rows {
     /// The same rows, with another single bladder.
     pub(crate) fn with_single_bladder(&self, single_bladder: SingleBladder) -> Self {
         Self { single_bladder, ..self.clone() }
+    }
+    /// The same rows, where the stiffness of the single bladder may change in proportion to the pressure.
+    pub(crate) fn with_stiffening_bladder(&self) -> Self {
+        Self { bladder_stiffens: true, ..self.clone() }
+    }
+    /// The same rows, with another beginning of recordings.
+    pub(crate) fn with_beginning(&self, beginning: Beginning) -> Self {
+        Self { beginning, ..self.clone() }
     }
     /// The same rows, of which some no longer count.
     pub(crate) fn without(&self, masked: impl Fn(usize) -> bool) -> Self {
@@ -241,6 +260,8 @@ impl Rows {
             root_weight: Arc::new(pick(stride, &self.root_weight)),
             rest_friction: Arc::new(rest_friction),
             single_bladder: self.single_bladder,
+            bladder_stiffens: self.bladder_stiffens,
+            beginning: self.beginning,
             progress: self.progress.clone(),
         }
     }
@@ -317,6 +338,8 @@ pub(crate) fn prepare_corrected(
         root_weight: Arc::new(root_weight),
         rest_friction: Arc::new(RestFriction::as_modelled(n)),
         single_bladder: SingleBladder::default(),
+        bladder_stiffens: false,
+        beginning: Beginning::default(),
         progress: SharedProgress::default(),
     };
     Ok((rows, remarks))

@@ -223,6 +223,52 @@ pub(crate) fn model_weight(competitors: &[(usize, f64, f64)]) -> f64 {
     1.0 / (1.0 + competitors.iter().map(|r| r.1).sum::<f64>())
 }
 
+/// The number of free parameters of a fit.
+fn numbers(fit: &CandidateFit) -> f64 {
+    (fit.amplitudes.iter().filter(|a| **a != 0.0).count() + fit.shapes.len()) as f64
+}
+
+/// The explanation with which another one is compared.
+struct Standing {
+    /// What noise leaves, N².
+    noise: f64,
+    /// What the winner leaves above it, and what the inexactness of a law leaves, N².
+    own: f64,
+    floor: f64,
+    /// The number of the winner's free parameters.
+    numbers: f64,
+}
+
+impl Standing {
+    fn of(winner: &CandidateFit, library: &[Candidate], rows: &Rows, scorer: &Scorer<'_>) -> Self {
+        let scale = &scorer.scale;
+        let noise = scale.sigma * scale.sigma * scale.weight;
+        let (left, before) = scorer.left_under(winner, library, rows, winner.prior);
+        let excess = |e: f64| (e - noise).max(0.0);
+        let floor = COMPETITOR_FLOOR * excess(before) + noise * (2.0 / scale.independent.max(2.0)).sqrt();
+        Self { noise, own: excess(left), floor, numbers: numbers(winner) }
+    }
+
+    /// The weight against the winner (1) of an explanation that leaves this, N², with this number of free parameters.
+    fn weight_of(&self, left: f64, numbers: f64) -> f64 {
+        let excess = (left - self.noise).max(0.0);
+        let worse = ((excess + self.floor) / (self.own + self.floor)).ln();
+        (-COMPETITOR_SHARPNESS * worse - COMPETITOR_COST * (numbers - self.numbers)).min(0.0).exp()
+    }
+}
+
+/// The weight against an effect (1) of a bladder whose stiffness grows or falls in proportion to the pressure.
+pub(crate) fn weight_of_stiffening(
+    winner: &CandidateFit,
+    library: &[Candidate],
+    rows: &Rows,
+    scorer: &Scorer<'_>,
+) -> f64 {
+    let stiffening: Vec<f64> = rows.contexts().iter().map(|c| c.elastic * c.pressure).collect();
+    let left = scorer.left_with(&stiffening, rows, winner.prior);
+    Standing::of(winner, library, rows, scorer).weight_of(left, 1.0)
+}
+
 /// The weight of each competitor against the winner, from what each leaves of the misfit above noise where the bladder differs between
 /// pressures as much as it does beside the winner.
 pub(crate) fn competitors(
@@ -234,22 +280,13 @@ pub(crate) fn competitors(
     span: &baselines::Absorbable,
 ) -> Vec<(usize, f64, f64)> {
     let mine = candidate_fit::projected_trace(winner, library, rows, span);
-    let numbers =
-        |t: &CandidateFit| (t.amplitudes.iter().filter(|a| **a != 0.0).count() + t.shapes.len()) as f64;
-    let scale = &scorer.scale;
-    let noise_energy = scale.sigma * scale.sigma * scale.weight;
-    let excess = |e: f64| (e - noise_energy).max(0.0);
-    let (own_left, before) = scorer.left_under(winner, library, rows, winner.prior);
-    let floor = COMPETITOR_FLOOR * excess(before) + noise_energy * (2.0 / scale.independent.max(2.0)).sqrt();
+    let standing = Standing::of(winner, library, rows, scorer);
     let mut competitors: Vec<(usize, f64, f64)> = best
         .par_iter()
         .filter(|t| t.candidate != winner.candidate && t.gain > 0.0)
         .map(|t| {
             let (left, _) = scorer.left_under(t, library, rows, winner.prior);
-            let worse = ((excess(left) + floor) / (excess(own_left) + floor)).ln();
-            let weight = (-COMPETITOR_SHARPNESS * worse - COMPETITOR_COST * (numbers(t) - numbers(winner)))
-                .min(0.0)
-                .exp();
+            let weight = standing.weight_of(left, numbers(t));
             let c = cosine(&mine, &candidate_fit::projected_trace(t, library, rows, span));
             (t.candidate, weight, c)
         })

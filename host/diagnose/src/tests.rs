@@ -3,6 +3,7 @@
 //! The force comes from a table muscle, friction and faults from plain formulas below, not from the library of effects.
 
 pub(crate) mod added;
+mod beginnings;
 mod filtered;
 mod held_length;
 mod plays;
@@ -47,6 +48,10 @@ pub(crate) fn geometry() -> Geometry {
 
 /// Classic loops: six pressures, three triangular cycles each, one or more speeds (mm/s).
 pub(crate) fn loops(speeds: &[f64]) -> Campaign {
+    loops_of(&muscle(), speeds)
+}
+
+fn loops_of(muscle: &Muscle<f64>, speeds: &[f64]) -> Campaign {
     let mut step = Vec::new();
     for p in [230.0, 290.0, 350.0, 410.0, 480.0, 550.0] {
         step.push(Step::Pressure { to_kpa: p, rate_kpa_s: Some(50.0), settle_s: 1.0 });
@@ -58,7 +63,7 @@ pub(crate) fn loops(speeds: &[f64]) -> Campaign {
         step.push(Step::EndFile);
     }
     let protocol = Protocol { name: "loops".into(), sample_hz: 10.0, step };
-    play(&protocol, &muscle()).expect("playable")
+    play(&protocol, muscle).expect("playable")
 }
 
 /// Puts friction of 8 %, an effect and noise on the forces. `effect` sees speed, direction and the friction-free force.
@@ -119,6 +124,21 @@ fn correlated_noise_is_not_named() {
         let d = ask(&recorded(loops(&[0.2]), seed, coloured(0.3, 10.0), |_, _, _| 0.0));
         assert_eq!(d.verdict(), Verdict::Consistent, "seed {seed}: {:?}", names(&d));
         assert!(d.missing.is_empty());
+    }
+}
+
+/// Stiffness in proportion to the pressure is what tables are for: where noise hides what distinguishes it from an effect, no effect is named.
+#[test]
+fn a_bladder_that_stiffens_with_the_pressure_is_not_named() {
+    let mut stiffening = one_bladder();
+    let top = stiffening.nodes[stiffening.nodes.len() - 1];
+    for curve in &mut stiffening.elastic {
+        curve.iter_mut().zip(&stiffening.nodes).for_each(|(e, p)| *e *= 0.5 + p / top);
+    }
+    let muscle = Muscle::build(&stiffening).expect("a table");
+    for seed in 3..6 {
+        let d = ask(&recorded(loops_of(&muscle, &[0.5]), seed, coloured(0.4, 6.0), |_, _, _| 0.0));
+        assert_eq!(names(&d), Vec::<&str>::new(), "seed {seed}: {:?}", d.verdict());
     }
 }
 

@@ -3,7 +3,7 @@
 use model_core::spline;
 
 use super::Kind;
-use crate::criteria::baseline::{FRICTION_POWERS, FRICTION_RANGE, TABLE_ORDER};
+use crate::criteria::baseline::{FRICTION_POWERS, FRICTION_RANGE, STIFFENING_ORDERS, TABLE_ORDER};
 use crate::rows::{ORDERS, Rows, SingleBladder, YEOH};
 
 /// The cardinal functions of the natural spline on the levels, at pressure `p` (held at the ends).
@@ -122,6 +122,8 @@ impl Plan {
                     0.0
                 }
             };
+            // Functions of pressure: its powers, from the constant on.
+            const LINEAR: usize = 1;
             for degree in 0..rows.levels.len().clamp(1, FRICTION_POWERS) {
                 functions.push(rows.contexts().iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
             }
@@ -131,6 +133,9 @@ impl Plan {
                     hard.extend((0..YEOH).map(Part::Yeoh));
                 }
                 SingleBladder::AsTable => hard.extend((0..TABLE_ORDER).map(|k| Part::Elastic(k, 0))),
+            }
+            if rows.bladder_stiffens() && functions.len() > LINEAR {
+                hard.extend((0..STIFFENING_ORDERS).map(|k| Part::Elastic(k, LINEAR)));
             }
             hard.extend((0..functions.len()).map(Part::Friction));
             if matches!(kind, Kind::Soft(_)) && rows.levels.len() > 1 {

@@ -25,6 +25,8 @@ pam_data::criteria! {
     FRICTION_LIMITS: ((f64, f64)) = (-0.4, 0.8), "k_F", "1", Judgement;
     /// Powers of pressure in the friction of one bladder for all pressures, at most.
     FRICTION_POWERS: usize = 3, "n_k", "1", Judgement;
+    /// Elastic orders whose stiffness may change in proportion to the pressure, where one bladder for all pressures is allowed that.
+    STIFFENING_ORDERS: usize = 2, "M_P", "1", Judgement;
     /// The powers are held constant this far beyond the tested range, in half-ranges.
     FRICTION_RANGE: f64 = 1.2, "u_max", "1", Judgement;
     /// Free tables: prior deviation of elastic surface and friction, in blocked forces; large enough that it does not bind.

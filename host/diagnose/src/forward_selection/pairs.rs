@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use super::super::baselines::Kind;
 use super::super::candidate_fit::CandidateFit;
 use super::super::candidate_scoring::Scorer;
-use super::super::criteria::selection::{FIRSTS_OF_PAIRS, FURTHER_SHARE, MOST_SELECTED};
+use super::super::criteria::selection::{ALIKE, FIRSTS_OF_PAIRS, FURTHER_SHARE, MOST_SELECTED};
 use super::super::linear::energy;
 use super::super::selection_step::{refit, scan_step};
 use super::{ForwardSelection, Winner};
@@ -41,6 +41,10 @@ impl ForwardSelection<'_> {
     /// Selects a pair, unless another explanation is as likely as one of its effects; ends the selection where it cannot.
     pub(super) fn select_pair(&mut self, pair: Pair) -> ControlFlow<()> {
         for winner in &pair.winners {
+            if winner.stiffening >= ALIKE {
+                self.let_bladder_stiffen(&winner.fit);
+                return ControlFlow::Continue(());
+            }
             if let Some(why) = self.too_many_competitors(winner) {
                 self.refuse(winner.fit.candidate, why);
                 return ControlFlow::Break(());

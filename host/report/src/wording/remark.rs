@@ -13,6 +13,17 @@ pub fn remark(remark: &Remark) -> String {
             "the static model of all mountings, without the memory, leaves {rms:.2} N rms. Geometry, end effects and mounted lengths (±1 mm by \
              tape measure) are not identifiable from one muscle; diagnose three or more muscles of one type together to identify them"
         ),
+        Remark::BeginsWithinStroke(effect) => format!(
+            "friction opposes the first stroke of each recording from its beginning, as in a muscle that was just filled: {effect} begins \
+             with the first reversal"
+        ),
+        Remark::BeginsJustFilled(effect) => {
+            format!("each recording begins as if the muscle had been vented for long and was just filled: {effect} begins there")
+        }
+        Remark::BladderStiffens(effect) => format!(
+            "a bladder whose stiffness changes with the pressure explains as much as {effect} would, and tables contain that: effects were \
+             looked for beside it"
+        ),
         Remark::MemoryInTable => {
             "the table that -o writes contains the memory as `bladder-creep` if this improves the prediction of the recordings. The length was \
              held throughout, so under motion the memory is a prediction. To measure its recovery, vent the muscle for an hour, then repeat a \
