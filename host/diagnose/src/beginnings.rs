@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
+use super::criteria::candidates::VENTED_BEFORE_FILLING;
 use super::criteria::selection::LEAST_SCORE;
 use super::remark::Remark;
 use super::rows::Rows;
@@ -92,9 +93,8 @@ pub(crate) fn preceded(rows: &Rows, law: &Info) -> (Vec<Context<f64>>, Vec<bool>
 
 /// The same muscle, vented for longer than any memory lasts.
 fn vented(filled: &Context<f64>) -> Context<f64> {
-    const LONG: f64 = 1e9;
     Context {
-        dt: LONG,
+        dt: VENTED_BEFORE_FILLING,
         pressure: 0.0,
         corrected_pressure: 0.0,
         gaylord: 0.0,

@@ -122,8 +122,6 @@ impl Plan {
                     0.0
                 }
             };
-            // Functions of pressure: its powers, from the constant on.
-            const LINEAR: usize = 1;
             for degree in 0..rows.levels.len().clamp(1, FRICTION_POWERS) {
                 functions.push(rows.contexts().iter().map(|c| u(c.pressure).powi(degree as i32)).collect());
             }
@@ -134,8 +132,10 @@ impl Plan {
                 }
                 SingleBladder::AsTable => hard.extend((0..TABLE_ORDER).map(|k| Part::Elastic(k, 0))),
             }
-            if rows.bladder_stiffens() && functions.len() > LINEAR {
-                hard.extend((0..STIFFENING_ORDERS).map(|k| Part::Elastic(k, LINEAR)));
+            // The functions are the powers of the pressure, from the constant on.
+            let linear = 1;
+            if rows.bladder_stiffens() && functions.len() > linear {
+                hard.extend((0..STIFFENING_ORDERS).map(|k| Part::Elastic(k, linear)));
             }
             hard.extend((0..functions.len()).map(Part::Friction));
             if matches!(kind, Kind::Soft(_)) && rows.levels.len() > 1 {
