@@ -1,43 +1,17 @@
-//! The state of a muscle at the beginning of a recording.
+//! The state of a muscle at the beginning of a recording, as the recordings show it.
 //!
-//! A law with a memory is carried on from recording to recording. Where the muscle was vented and filled in between, this is wrong in two ways.
-//! Its strands have slipped, so that friction opposes the first stroke from its beginning and nothing builds up there, as it does after each
-//! reversal later on. And its bladder begins to creep or to relax under the whole pressure, not under the change from the last one. How well laws
-//! fit decides what holds: taken the wrong way, the beginnings of recordings contradict the rest of them.
+//! A law with a memory is carried on from recording to recording. Where the muscle was vented and filled in between, this is wrong in two ways
+//! ([`Beginning`]). How well laws fit decides what holds: taken the wrong way, the beginnings of recordings contradict the rest of them.
 
-use model_core::effects::{Context, Info, Link, Start};
+use model_core::effects::{Context, Info};
 use rayon::prelude::*;
 
 use super::candidate_scoring::Scorer;
 use super::candidates::Candidate;
-use super::criteria::candidates::VENTED_BEFORE_FILLING;
 use super::criteria::selection::LEAST_SCORE;
 use super::remark::Remark;
 use super::rows::Rows;
-
-/// What is known of the muscle before the first row of a recording. By default it is as the recording before left it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Beginning {
-    /// The first stroke had begun long before, for laws that remember the last reversal.
-    pub within_stroke: bool,
-    /// The muscle had been vented for long and was just filled, for memories of the bladder.
-    pub just_filled: bool,
-}
-
-impl Beginning {
-    /// Whether a law begins otherwise than the recording before ended.
-    pub(crate) fn concerns(self, law: &Info) -> bool {
-        self.within_stroke && remembers_reversal(law) || self.just_filled && remembers_load(law)
-    }
-}
-
-fn remembers_reversal(law: &Info) -> bool {
-    law.start == Start::Branch
-}
-
-fn remembers_load(law: &Info) -> bool {
-    law.link == Link::Memory && law.start == Start::Settled
-}
+use pam_fit::beginning::{Beginning, is_stroke};
 
 /// The rows with the beginnings under which laws with a memory are more likely, by as much as evidence requires.
 pub(crate) fn settle(rows: &Rows, library: &[Candidate], scorer: &Scorer<'_>) -> Rows {
@@ -48,8 +22,8 @@ pub(crate) fn settle(rows: &Rows, library: &[Candidate], scorer: &Scorer<'_>) ->
         best(begins) - best(carried) >= LEAST_SCORE
     };
     rows.with_beginning(Beginning {
-        within_stroke: more_likely(Beginning { within_stroke: true, ..carried }, remembers_reversal),
-        just_filled: more_likely(Beginning { just_filled: true, ..carried }, remembers_load),
+        within_stroke: more_likely(Beginning { within_stroke: true, ..carried }, Beginning::is_of_reversal),
+        just_filled: more_likely(Beginning { just_filled: true, ..carried }, Beginning::is_of_load),
     })
 }
 
@@ -58,8 +32,8 @@ pub(crate) fn remarks(rows: &Rows, effects: &[&Info]) -> Vec<Remark> {
     let Beginning { within_stroke, just_filled } = rows.beginning();
     let first =
         |concerned: fn(&Info) -> bool| effects.iter().find(|e| concerned(e)).map(|e| e.name.to_owned());
-    let reversal = first(remembers_reversal).filter(|_| within_stroke).map(Remark::BeginsWithinStroke);
-    let load = first(remembers_load).filter(|_| just_filled).map(Remark::BeginsJustFilled);
+    let reversal = first(Beginning::is_of_reversal).filter(|_| within_stroke).map(Remark::BeginsWithinStroke);
+    let load = first(Beginning::is_of_load).filter(|_| just_filled).map(Remark::BeginsJustFilled);
     reversal.into_iter().chain(load).collect()
 }
 
@@ -76,38 +50,18 @@ pub(crate) fn preceded(rows: &Rows, law: &Info) -> (Vec<Context<f64>>, Vec<bool>
     let (mut contexts, mut is_row) = (Vec::with_capacity(rows.len() + rows.names.len()), Vec::new());
     for (i, context) in rows.contexts().iter().enumerate() {
         let begins = i == 0 || rows.recording[i] != rows.recording[i - 1];
-        let before = if !begins {
-            None
-        } else if remembers_load(law) {
-            Some(vented(context))
-        } else {
-            before_first_stroke(rows, i)
-        };
-        contexts.extend(before);
-        is_row.resize(contexts.len(), false);
-        contexts.push(if before.is_some() { Context { dt: 0.0, ..*context } } else { *context });
+        if begins {
+            contexts.push(Beginning::before(context, &first_stroke(rows, i).unwrap_or(*context), law));
+            is_row.push(false);
+        }
+        contexts.push(if begins { Beginning::first(context) } else { *context });
         is_row.push(true);
     }
     (contexts, is_row)
 }
 
-/// The same muscle, vented for longer than any memory lasts.
-fn vented(filled: &Context<f64>) -> Context<f64> {
-    Context {
-        dt: VENTED_BEFORE_FILLING,
-        pressure: 0.0,
-        corrected_pressure: 0.0,
-        gaylord: 0.0,
-        quasi: filled.elastic,
-        ..*filled
-    }
-}
-
-/// A place from which the first stroke of the recording that begins with row `from` comes, farther away than any memory reaches.
-fn before_first_stroke(rows: &Rows, from: usize) -> Option<Context<f64>> {
+/// A row of the first stroke of the recording that begins with row `from`.
+fn first_stroke(rows: &Rows, from: usize) -> Option<Context<f64>> {
     let own = (from..rows.len()).take_while(|i| rows.recording[*i] == rows.recording[from]);
-    let first = own.map(|i| rows.contexts()[i]).find(|c| c.speed != 0.0 && c.direction != 0.0)?;
-    let begin = rows.contexts()[from];
-    let stroke = begin.stroke - first.direction * begin.rest_length;
-    Some(Context { stroke, direction: first.direction, speed: first.speed, ..begin })
+    own.map(|i| rows.contexts()[i]).find(is_stroke)
 }

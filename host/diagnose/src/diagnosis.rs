@@ -385,6 +385,7 @@ fn answer(
         remarks,
         profiles: located.profiles,
         trace: trace(&selection.rows, &selection),
+        beginning: selection.rows.beginning(),
         history: None,
     }
 }

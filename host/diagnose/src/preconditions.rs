@@ -9,6 +9,7 @@ use super::remark::{Remark, Unjudgeable};
 use super::rows::Rows;
 use super::verdict::{Considered, Diagnosis, HeldOut, Outcome, Pattern, Split, Trace, Unexplained, WhyNot};
 use pam_data::statistics::extremes;
+use pam_fit::beginning::Beginning;
 
 /// The scale of forces: what the highest pressure would give at rest length, or the largest force seen.
 pub(super) fn blocked_force(rows: &Rows) -> f64 {
@@ -105,6 +106,7 @@ pub(super) fn not_judged(
         remarks,
         profiles: Vec::new(),
         trace: Trace { time: Vec::new(), before: Vec::new(), after: Vec::new(), effects: Vec::new() },
+        beginning: Beginning::default(),
         history: None,
     }
 }

@@ -59,6 +59,7 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
     let mut left_out = None;
     let mut with = bare.clone();
     with.about.corrections.clone_from(&corrections);
+    with.about.beginning = diagnosis.beginning;
     with.table.effects = effects.iter().cloned().collect();
     for _ in 0..REFIT_ROUNDS {
         let mut without = with.clone();
@@ -77,6 +78,7 @@ pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagno
         with = again.table_file(tool());
         with.table.effects = effects.iter().cloned().collect();
         with.about.corrections.clone_from(&corrections);
+        with.about.beginning = diagnosis.beginning;
         left_out = unseen.zip(again.summary.left_out_pressure_mean_error_pct);
         warnings.clone_from(&again.summary.warnings);
     }

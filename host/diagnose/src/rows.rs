@@ -18,7 +18,6 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
-use super::beginnings::Beginning;
 use super::criteria::rows::{ONE_SPEED, PRESSURE_TRIM, SPEED_TRIM, SPIKES_MENTIONED};
 use super::remark::Remark;
 use pam_data::error::Result;
@@ -28,6 +27,7 @@ use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, resolution};
 use pam_data::statistics::quantile;
 use pam_fit::Clip;
+use pam_fit::beginning::Beginning;
 
 /// What was recorded, row by row. Nothing changes it.
 #[derive(Clone, Debug, Default)]

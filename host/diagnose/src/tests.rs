@@ -493,13 +493,10 @@ fn wearing() -> (Campaign, Campaign) {
     (with_noise(now, 3), with_noise(later, 4))
 }
 
-#[test]
-fn an_effect_that_tables_share_out_between_pressures_is_written_into_the_table() {
-    let (now, later) = wearing();
-    let diagnosis = ask(&now);
-    assert_eq!(names(&diagnosis), ["cyclic-softening"], "{:?}", diagnosis.missing);
+/// The description of the muscle of all tests.
+fn described() -> MuscleDescription {
     let of = geometry();
-    let muscle = MuscleDescription {
+    MuscleDescription {
         name: "test".into(),
         kind: Kind::Contractile,
         rest_length_mm: of.rest_length.metres() * 1e3,
@@ -509,7 +506,15 @@ fn an_effect_that_tables_share_out_between_pressures_is_written_into_the_table()
         young_modulus_MPa: None,
         max_pressure_kPa: None,
         max_contraction: None,
-    };
+    }
+}
+
+#[test]
+fn an_effect_that_tables_share_out_between_pressures_is_written_into_the_table() {
+    let (now, later) = wearing();
+    let diagnosis = ask(&now);
+    assert_eq!(names(&diagnosis), ["cyclic-softening"], "{:?}", diagnosis.missing);
+    let muscle = described();
     let mut with = refitted_table::refit(&now, &muscle, &diagnosis).expect("a table").file;
     assert_eq!(with.table.effects.len(), 1);
     // The worn muscle after all that it went through; the readings about each turn, a jump of friction, are not what this is about.

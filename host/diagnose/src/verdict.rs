@@ -12,6 +12,7 @@ pub use crate::outcome::{Outcome, Pattern, Split, Verdict};
 pub use crate::remark::Remark;
 pub use crate::why::Why;
 pub use crate::why_not::WhyNot;
+use pam_fit::beginning::Beginning;
 
 /// Where the misfit's energy above the noise is concentrated along one coordinate.
 #[derive(Clone, Debug, PartialEq)]
@@ -283,6 +284,8 @@ pub struct Diagnosis {
     pub profiles: Vec<Profile>,
     /// For pictures.
     pub trace: Trace,
+    /// How the recordings begin, for effects with a memory.
+    pub beginning: Beginning,
     /// What the muscle remembers over a campaign of isometric staircases; absent of other campaigns.
     pub history: Option<super::history::History>,
 }

@@ -53,6 +53,7 @@
 
 #![warn(unreachable_pub)]
 
+pub mod beginning;
 pub mod bench;
 pub mod checks;
 pub mod confidence_band;

@@ -8,13 +8,14 @@ use std::borrow::Cow;
 use std::fmt::Write;
 use std::fs;
 
-use model_core::effects::{Chain, Memory};
+use model_core::effects::{Chain, Context, Info, Memory};
 use model_core::motion::Motion as MotionSample;
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
 use model_core::units::{Length, Pressure};
 use rayon::prelude::*;
 
+use crate::beginning::{Beginning, is_stroke};
 use crate::bench::Candidate;
 use crate::confidence_band::ConfidenceBand;
 use crate::fit::points::HeldMounting;
@@ -187,7 +188,7 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
                     model.chain.step(&context);
                 }
             }
-            model.with_effects(recording, &motions)
+            model.with_effects(recording, &motions, file.about.beginning)
         };
         let errors = limits.errors(recording, &force, &screened.read(index));
         square += errors.square;
@@ -268,16 +269,48 @@ impl Model<'_> {
         (0..recording.len()).map(force).collect()
     }
 
+    /// Puts every memory into the state from which it begins at the first row of a recording.
+    fn precede(&mut self, first: &Context<f64>, stroke: &Context<f64>, beginning: Beginning) {
+        let before = |law: &Info| beginning.concerns(law).then(|| Beginning::before(first, stroke, law));
+        self.chain.step_each(|effect| before(effect.info()));
+        for (candidate, parameters, memory) in &mut self.corrections {
+            if let Some(context) = before(candidate.info()) {
+                candidate.step(parameters, &context, memory);
+            }
+        }
+    }
+
+    /// Lets the time of a row pass in every memory.
+    fn step(&mut self, row: &Context<f64>, beginning: Beginning) {
+        let seen = |law: &Info| if beginning.concerns(law) { Beginning::first(row) } else { *row };
+        self.chain.step_each(|effect| Some(seen(effect.info())));
+        for (candidate, parameters, memory) in &mut self.corrections {
+            candidate.step(parameters, &seen(candidate.info()), memory);
+        }
+    }
+
     /// The force with effects and corrections in every row, N.
-    fn with_effects(&mut self, recording: &Recording, motions: &[MotionSample<f64>]) -> Vec<f64> {
+    fn with_effects(
+        &mut self,
+        recording: &Recording,
+        motions: &[MotionSample<f64>],
+        beginning: Beginning,
+    ) -> Vec<f64> {
+        let row = |muscle: &Muscle<f64>, i: usize| {
+            muscle.context(&motions[i], Pressure::from_pascals(recording.pressure[i]))
+        };
+        if !motions.is_empty() && beginning != Beginning::default() {
+            let first = row(&self.muscle, 0);
+            let stroke = (0..motions.len()).map(|i| row(&self.muscle, i)).find(is_stroke);
+            self.precede(&first, &stroke.unwrap_or(first), beginning);
+        }
         let mut forces = Vec::with_capacity(recording.len());
-        for (i, motion) in motions.iter().enumerate() {
-            let context = self.muscle.context(motion, Pressure::from_pascals(recording.pressure[i]));
-            self.chain.step(&context);
+        for i in 0..motions.len() {
+            let context = row(&self.muscle, i);
+            self.step(&context, if i == 0 { beginning } else { Beginning::default() });
             // A slack muscle transmits no force; what the bench adds to the reading acts all the same.
             let (mut pull, mut read) = (context.force() + self.chain.force(&context), 0.0);
-            for (candidate, parameters, memory) in &mut self.corrections {
-                candidate.step(parameters, &context, memory);
+            for (candidate, parameters, memory) in &self.corrections {
                 let part = candidate.force(parameters, &context, memory);
                 *if candidate.acts_on_a_slack_muscle(0) { &mut read } else { &mut pull } += part;
             }

@@ -15,6 +15,7 @@ use model_core::table::MuscleTable;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::beginning::Beginning;
 use crate::fit::dimensions::Mounting;
 use crate::fit::problem::Problem;
 use crate::vented_rest::EarlierLoad;
@@ -26,11 +27,10 @@ use pam_data::recording::Campaign;
 
 const MAGIC: [u8; 4] = *b"PAMF";
 /// The version that is written.
-pub const VERSION: u16 = 3;
-/// The version before, which is read too: it lacks the last field, [`About::earlier_load`].
-const WITHOUT_EARLIER_LOAD: u16 = 2;
-/// The last field where there is none, as postcard writes it.
-const NONE: u8 = 0;
+pub const VERSION: u16 = 4;
+/// Versions before, which are read too, and what postcard writes for the last fields that they lack: [`About::beginning`], and
+/// [`About::earlier_load`] before it.
+const EARLIER: [(u16, &[u8]); 2] = [(3, &[0, 0]), (2, &[0, 0, 0])];
 const HEADER: usize = 12;
 const CHECKSUM: usize = 4;
 /// A file that announces more is not read: no table comes near it.
@@ -66,6 +66,8 @@ pub struct About {
     pub mountings: Vec<StoredMounting>,
     /// What the muscle had carried before the recordings of the fit. `predict` counts it before recordings at held lengths.
     pub earlier_load: Option<EarlierLoad>,
+    /// How recordings begin, for effects with a memory. `predict` counts it before each; a controller follows the muscle from one to the next.
+    pub beginning: Beginning,
 }
 
 /// A mounting whose recordings were held at one length.
@@ -175,9 +177,11 @@ impl TableFile {
                 .help("tables end in .pam and are written by `host fit` or `host diagnose`"));
         }
         let found = u16::from_le_bytes([bytes[4], bytes[5]]);
-        if ![VERSION, WITHOUT_EARLIER_LOAD].contains(&found) {
+        let earlier = EARLIER.iter().find(|(version, _)| *version == found);
+        if found != VERSION && earlier.is_none() {
             return Err(wrong(format!(
-                "the file has table format {found}, this program reads table formats {WITHOUT_EARLIER_LOAD} and {VERSION}"
+                "the file has table format {found}, this program reads table formats {} to {VERSION}",
+                EARLIER[EARLIER.len() - 1].0
             ))
             .help("use the version of the program that wrote it, or fit the muscle again"));
         }
@@ -196,9 +200,7 @@ impl TableFile {
             return Err(wrong("the file's checksum does not fit".into()).help(damaged));
         }
         let mut content = content[HEADER..].to_vec();
-        if found == WITHOUT_EARLIER_LOAD {
-            content.push(NONE);
-        }
+        content.extend(earlier.map_or(&[][..], |(_, lacking)| lacking));
         let (body, rest): (Body, &[u8]) = postcard::take_from_bytes(&content)
             .map_err(|e| wrong(format!("the file's content cannot be decoded: {e}")).help(damaged))?;
         if !rest.is_empty() {
@@ -345,16 +347,26 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_the_version_before_is_read() {
-        let mut bytes = example().to_bytes().expect("valid");
-        bytes.truncate(bytes.len() - CHECKSUM);
-        assert_eq!(bytes.pop(), Some(NONE), "the last field");
-        bytes[4..6].copy_from_slice(&WITHOUT_EARLIER_LOAD.to_le_bytes());
-        let length = (bytes.len() - HEADER) as u32;
-        bytes[8..12].copy_from_slice(&length.to_le_bytes());
-        let crc = check::crc32(&bytes);
-        bytes.extend_from_slice(&crc.to_le_bytes());
-        assert_eq!(TableFile::from_bytes(&bytes).expect("readable"), example());
+    fn files_of_earlier_versions_are_read() {
+        for (version, lacking) in EARLIER {
+            let mut bytes = example().to_bytes().expect("valid");
+            bytes.truncate(bytes.len() - CHECKSUM);
+            assert!(bytes.ends_with(lacking), "the last fields");
+            bytes.truncate(bytes.len() - lacking.len());
+            bytes[4..6].copy_from_slice(&version.to_le_bytes());
+            let length = (bytes.len() - HEADER) as u32;
+            bytes[8..12].copy_from_slice(&length.to_le_bytes());
+            let crc = check::crc32(&bytes);
+            bytes.extend_from_slice(&crc.to_le_bytes());
+            assert_eq!(TableFile::from_bytes(&bytes).expect("readable"), example(), "version {version}");
+        }
+    }
+
+    #[test]
+    fn the_beginning_of_recordings_is_kept() {
+        let mut file = example();
+        file.about.beginning = Beginning { within_stroke: true, just_filled: false };
+        assert_eq!(TableFile::from_bytes(&file.to_bytes().expect("valid")).expect("valid"), file);
     }
 
     #[test]
@@ -371,7 +383,7 @@ mod tests {
         let mut bytes = example().to_bytes().expect("valid");
         bytes[4] = 7;
         let text = TableFile::from_bytes(&bytes).expect_err("another version").to_string();
-        assert!(text.contains("format 7") && text.contains(&format!("and {VERSION}")), "{text}");
+        assert!(text.contains("format 7") && text.contains(&format!("to {VERSION}")), "{text}");
     }
 
     proptest! {

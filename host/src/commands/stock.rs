@@ -65,9 +65,7 @@ impl Arguments {
                 sources: table_file::sources(&campaign, &self.recordings.files, hashes),
                 fit: FitQuality { rms_newtons: found.rms, ..found.alone.summary.quality() },
                 uncertainty: Some(found.uncertainty.clone()),
-                corrections: Vec::new(),
-                mountings: Vec::new(),
-                earlier_load: None,
+                ..table_file::About::default()
             };
             let _lock = FolderLock::of([Some(path.as_path())])?;
             TableFile { table: found.table.clone(), about }.write(path)?;

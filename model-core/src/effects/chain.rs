@@ -92,6 +92,15 @@ impl<T: Scalar> Chain<T> {
         }
     }
 
+    /// The same with a context of its own for each effect; where there is none, no time passes.
+    pub fn step_each(&mut self, context: impl Fn(EffectName) -> Option<Context<T>>) {
+        for e in &mut self.effects {
+            if let Some(context) = context(e.effect) {
+                e.step(&context);
+            }
+        }
+    }
+
     /// The force that all effects together add, N.
     pub fn force(&self, context: &Context<T>) -> T {
         let mut sum = T::ZERO;

@@ -30,8 +30,6 @@ pam_data::criteria! {
     TYPICAL_LEAST: f64 = 1e-3, "a_least/a_max", "1", Judgement;
     /// Amplitudes of one law that are fitted together, at most.
     MOST_AMPLITUDES: u32 = 6, "n_a", "1", Cost;
-    /// How long a muscle was vented before it was just filled.
-    VENTED_BEFORE_FILLING: f64 = 1e9, "t_vented", "s", Derived("a thousand times the longest memory of the catalogue: the load before is forgotten");
     /// The share of a column's energy outside the base from which it is judged at all.
     INVISIBLE: f64 = 1e-5, "q_vis", "1", Derived("below it the trace's root mean square outside the base is 0.3 % of its own, a tenth of a law's error");
     /// Pure error of a row, in blocked forces, at least.

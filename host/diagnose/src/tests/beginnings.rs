@@ -24,10 +24,14 @@ fn friction_that_builds_up(mut campaign: Campaign, travel: f64, begins: f64) -> 
 #[test]
 fn friction_that_builds_up_is_named_wherever_it_stands_at_the_beginning() {
     for begins in [1.0, -1.0] {
-        let d = ask(&friction_that_builds_up(loops(&[0.2]), 1.5e-4, begins));
+        let campaign = friction_that_builds_up(loops(&[0.2]), 1.5e-4, begins);
+        let d = ask(&campaign);
         assert_eq!(names(&d), ["presliding-hysteresis"], "begins at {begins}");
         let remarked = d.remarks.iter().any(|r| matches!(r, Remark::BeginsWithinStroke(_)));
         assert_eq!(remarked, begins > 0.0, "{:?}", d.remarks);
+        let table = refitted_table::refit(&campaign, &described(), &d).expect("a table");
+        assert_eq!(table.file.table.effects.len(), 1, "{:?}", table.comparison);
+        assert!(table.rms_after < 0.4 * table.rms_before, "{} {}", table.rms_after, table.rms_before);
         assert!(d.missing[0].share_explained > 0.8, "begins at {begins}: {}", d.missing[0].share_explained);
     }
 }
