@@ -1,7 +1,8 @@
 //! The state of a muscle before the first row of a recording, for laws with a memory.
 //!
 //! A memory is carried on from recording to recording. Where the muscle was vented and filled in between, its strands have slipped, so that
-//! friction opposes the first stroke from its beginning, and its bladder begins to creep or to relax under the whole pressure.
+//! friction opposes the first stroke from its beginning. Its bladder begins to creep or to relax under the whole pressure, not under the change
+//! from the last one.
 
 use model_core::effects::{Context, Info, Link, Start};
 use serde::{Deserialize, Serialize};
