@@ -2,27 +2,26 @@
 //!
 //! Effects have a memory, which runs through the recordings in their order: earlier files are the muscle's history. Over a pause
 //! of known length the memories fade as they do in time; an unknown pause counts as a minute. Between recordings at held lengths the
-//! muscle is vented ([`crate::vented_rest`]), and for longer where it is remounted.
+//! muscle is vented ([`crate::vented_rest`]), and for longer where it is remounted. Where a table states how recordings begin
+//! ([`crate::beginning`]), memories begin so.
+
+mod model;
 
 use std::borrow::Cow;
 use std::fmt::Write;
 use std::fs;
 
-use model_core::effects::{Chain, Context, Info, Memory};
-use model_core::motion::Motion as MotionSample;
 use model_core::muscle::Muscle;
 use model_core::table::MuscleTable;
-use model_core::units::{Length, Pressure};
 use rayon::prelude::*;
 
-use crate::beginning::{Beginning, is_stroke};
-use crate::bench::Candidate;
 use crate::confidence_band::ConfidenceBand;
 use crate::fit::points::HeldMounting;
 use crate::fit::screen::clip;
-use crate::table_file::{Correction, StoredMounting, TableFile};
+use crate::table_file::{StoredMounting, TableFile};
 use crate::vented_rest;
-use pam_data::error::{DataCode, Error, Result};
+use model::Model;
+use pam_data::error::Result;
 use pam_data::physical_limits::Contractions;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
@@ -72,8 +71,8 @@ pub struct Bands {
 /// Predicts the force of a campaign. Readings of a failed sensor are interpolated ([`pam_data::recording::dropouts`]).
 ///
 /// # Errors
-/// [`DataCode::TableInvalid`] where the table cannot be evaluated, or names a correction that this program does not know;
-/// [`DataCode::RecordingOutOfRange`] where a recording has a length that the table's braid cannot have.
+/// [`TableInvalid`](pam_data::error::DataCode::TableInvalid) where the table cannot be evaluated, or names a correction that this program does not know;
+/// [`RecordingOutOfRange`](pam_data::error::DataCode::RecordingOutOfRange) where a recording has a length that the table's braid cannot have.
 pub fn predict(file: &TableFile, campaign: &Campaign) -> Result<Prediction> {
     run(file, campaign, None)
 }
@@ -163,10 +162,7 @@ fn bands(
 fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> Result<Prediction> {
     let screened = Screened::of(campaign);
     let campaign = screened.campaign.as_ref();
-    let muscle =
-        Muscle::<f64>::build(&file.table).map_err(|e| Error::new(DataCode::TableInvalid, e.to_string()))?;
-    let chain = Chain::<f64>::new(&file.table.effects);
-    let mut model = Model { muscle, chain, corrections: corrections(file)? };
+    let mut model = Model::of(file)?;
     let corrected: Vec<Cow<'_, Recording>> =
         campaign.recordings.iter().map(|r| with_true_length(file, r)).collect();
     check_contractions(&model.muscle, &corrected)?;
@@ -209,28 +205,6 @@ fn run(file: &TableFile, campaign: &Campaign, band: Option<&ConfidenceBand>) -> 
     Ok(Prediction { recordings, rms, warnings })
 }
 
-/// A correction of the bench with its parameters and its memory.
-type StoredCorrection<'a> = (Candidate, &'a [f64], Memory<f64>);
-
-/// # Errors
-/// A correction that this program does not know.
-fn corrections(file: &TableFile) -> Result<Vec<StoredCorrection<'_>>> {
-    let known = |c: &Correction| {
-        Candidate::from_name(&c.effect).filter(|k| k.info().parameters.len() == c.parameters.len())
-    };
-    file.about
-        .corrections
-        .iter()
-        .map(|c| {
-            let candidate = known(c).ok_or_else(|| {
-                Error::new(DataCode::TableInvalid, format!("unknown correction `{}`", c.effect))
-                    .help("a newer version of this program wrote the table: update this program")
-            })?;
-            Ok((candidate, c.parameters.as_slice(), Memory::<f64>::default()))
-        })
-        .collect()
-}
-
 /// # Errors
 /// A row whose length the table's braid cannot have.
 fn check_contractions(muscle: &Muscle<f64>, recordings: &[Cow<'_, Recording>]) -> Result<()> {
@@ -244,80 +218,6 @@ fn check_contractions(muscle: &Muscle<f64>, recordings: &[Cow<'_, Recording>]) -
         }
     }
     Ok(())
-}
-
-/// A table's muscle with the memory of its effects and corrections.
-struct Model<'a> {
-    muscle: Muscle<f64>,
-    chain: Chain<f64>,
-    corrections: Vec<StoredCorrection<'a>>,
-}
-
-impl Model<'_> {
-    /// Whether the force depends on the present only.
-    fn is_plain(&self) -> bool {
-        self.chain.is_empty() && self.corrections.is_empty()
-    }
-
-    /// The force of the base model in every row, N.
-    fn plain(&self, recording: &Recording, motion: &Motion) -> Vec<f64> {
-        let force = |i: usize| {
-            let p = Pressure::from_pascals(recording.pressure[i]);
-            let x = Length::from_metres(recording.stroke[i]);
-            self.muscle.force(p, x, f64::from(motion.direction[i])).newtons()
-        };
-        (0..recording.len()).map(force).collect()
-    }
-
-    /// Puts every memory into the state from which it begins at the first row of a recording.
-    fn precede(&mut self, first: &Context<f64>, stroke: &Context<f64>, beginning: Beginning) {
-        let before = |law: &Info| beginning.concerns(law).then(|| Beginning::before(first, stroke, law));
-        self.chain.step_each(|effect| before(effect.info()));
-        for (candidate, parameters, memory) in &mut self.corrections {
-            if let Some(context) = before(candidate.info()) {
-                candidate.step(parameters, &context, memory);
-            }
-        }
-    }
-
-    /// Lets the time of a row pass in every memory.
-    fn step(&mut self, row: &Context<f64>, beginning: Beginning) {
-        let seen = |law: &Info| if beginning.concerns(law) { Beginning::first(row) } else { *row };
-        self.chain.step_each(|effect| Some(seen(effect.info())));
-        for (candidate, parameters, memory) in &mut self.corrections {
-            candidate.step(parameters, &seen(candidate.info()), memory);
-        }
-    }
-
-    /// The force with effects and corrections in every row, N.
-    fn with_effects(
-        &mut self,
-        recording: &Recording,
-        motions: &[MotionSample<f64>],
-        beginning: Beginning,
-    ) -> Vec<f64> {
-        let row = |muscle: &Muscle<f64>, i: usize| {
-            muscle.context(&motions[i], Pressure::from_pascals(recording.pressure[i]))
-        };
-        if !motions.is_empty() && beginning != Beginning::default() {
-            let first = row(&self.muscle, 0);
-            let stroke = (0..motions.len()).map(|i| row(&self.muscle, i)).find(is_stroke);
-            self.precede(&first, &stroke.unwrap_or(first), beginning);
-        }
-        let mut forces = Vec::with_capacity(recording.len());
-        for i in 0..motions.len() {
-            let context = row(&self.muscle, i);
-            self.step(&context, if i == 0 { beginning } else { Beginning::default() });
-            // A slack muscle transmits no force; what the bench adds to the reading acts all the same.
-            let (mut pull, mut read) = (context.force() + self.chain.force(&context), 0.0);
-            for (candidate, parameters, memory) in &self.corrections {
-                let part = candidate.force(parameters, &context, memory);
-                *if candidate.acts_on_a_slack_muscle(0) { &mut read } else { &mut pull } += part;
-            }
-            forces.push(self.muscle.pull(pull).newtons() + read);
-        }
-        forces
-    }
 }
 
 /// The recording with the correction of its mounting, where the table knows the stroke that it was held at.

@@ -9,21 +9,10 @@ use pam_diagnose::remark::{Dimension, Refusal, Remark, RestFriction, Scatter, Un
 pub fn remark(remark: &Remark) -> String {
     match remark {
         Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
-        Remark::StaticMisfit(rms) => format!(
-            "the static model of all mountings, without the memory, leaves {rms:.2} N rms. Geometry, end effects and mounted lengths (±1 mm by \
-             tape measure) are not identifiable from one muscle; diagnose three or more muscles of one type together to identify them"
-        ),
-        Remark::BeginsWithinStroke(effect) => format!(
-            "friction opposes the first stroke of each recording from its beginning, as in a muscle that was just filled: {effect} begins \
-             with the first reversal"
-        ),
-        Remark::BeginsJustFilled(effect) => {
-            format!("each recording begins as if the muscle had been vented for long and was just filled: {effect} begins there")
-        }
-        Remark::BladderStiffens(effect) => format!(
-            "a bladder whose stiffness changes with the pressure explains as much as {effect} would, and tables contain that: effects were \
-             looked for beside it"
-        ),
+        Remark::StaticMisfit(rms) => static_misfit(*rms),
+        Remark::BeginsWithinStroke(effect) => begins_within_stroke(effect),
+        Remark::BeginsJustFilled(effect) => begins_just_filled(effect),
+        Remark::BladderStiffens(effect) => bladder_stiffens(effect),
         Remark::MemoryInTable => {
             "the table that -o writes contains the memory as `bladder-creep` if this improves the prediction of the recordings. The length was \
              held throughout, so under motion the memory is a prediction. To measure its recovery, vent the muscle for an hour, then repeat a \
@@ -199,6 +188,33 @@ fn first_of(names: &[String]) -> String {
         None => names.join(", "),
         Some(more) => format!("{}, and {} more", names[..LISTED].join(", "), more + 1),
     }
+}
+
+fn static_misfit(rms: f64) -> String {
+    format!(
+        "the static model of all mountings, without the memory, leaves {rms:.2} N rms. Geometry, end effects and mounted lengths (±1 mm by \
+         tape measure) are not identifiable from one muscle; diagnose three or more muscles of one type together to identify them"
+    )
+}
+
+fn begins_within_stroke(effect: &str) -> String {
+    format!(
+        "friction opposes the first stroke of each recording from its beginning, as in a muscle that was just filled: {effect} begins with \
+         the first reversal"
+    )
+}
+
+fn begins_just_filled(effect: &str) -> String {
+    format!(
+        "each recording begins as if the muscle had been vented for long and was just filled: {effect} begins there"
+    )
+}
+
+fn bladder_stiffens(effect: &str) -> String {
+    format!(
+        "a bladder whose stiffness changes with the pressure explains as much as {effect} would, and tables contain that: effects were \
+         looked for beside it"
+    )
 }
 
 fn refused(effect: &str, why: &Refusal) -> String {
