@@ -16,14 +16,15 @@ use pam_fit::beginning::{Beginning, is_stroke};
 /// The rows with the beginnings under which laws with a memory are more likely, by as much as evidence requires.
 pub(crate) fn settle(rows: &Rows, library: &[Candidate], scorer: &Scorer<'_>) -> Rows {
     let carried = Beginning::default();
-    let more_likely = |begins: Beginning, concerned: fn(&Info) -> bool| {
-        let best =
-            |beginning: Beginning| best_score(&rows.with_beginning(beginning), library, concerned, scorer);
+    let more_likely = |begins: Beginning| {
+        let best = |beginning: Beginning| {
+            best_score(&rows.with_beginning(beginning), library, |law| begins.concerns(law), scorer)
+        };
         best(begins) - best(carried) >= LEAST_SCORE
     };
     rows.with_beginning(Beginning {
-        within_stroke: more_likely(Beginning { within_stroke: true, ..carried }, Beginning::is_of_reversal),
-        just_filled: more_likely(Beginning { just_filled: true, ..carried }, Beginning::is_of_load),
+        within_stroke: more_likely(Beginning { within_stroke: true, ..carried }),
+        just_filled: more_likely(Beginning { just_filled: true, ..carried }),
     })
 }
 
@@ -38,7 +39,7 @@ pub(crate) fn remarks(rows: &Rows, effects: &[&Info]) -> Vec<Remark> {
 }
 
 /// The score of the most likely of some laws.
-fn best_score(rows: &Rows, library: &[Candidate], some: fn(&Info) -> bool, scorer: &Scorer<'_>) -> f64 {
+fn best_score(rows: &Rows, library: &[Candidate], some: impl Fn(&Info) -> bool, scorer: &Scorer<'_>) -> f64 {
     let laws = library.iter().enumerate().filter(|(_, c)| some(c.info));
     let shapes: Vec<_> = laws.flat_map(|(i, c)| c.grid().into_iter().map(move |s| (i, c, s))).collect();
     let scores = shapes.par_iter().map(|(i, c, s)| scorer.fit(*i, c, s, rows, false).score);

@@ -65,23 +65,25 @@ impl<'a> Model<'a> {
         (0..recording.len()).map(force).collect()
     }
 
-    /// Puts every memory into the state from which it begins at the first row of a recording.
-    fn precede(&mut self, first: &Context<f64>, stroke: &Context<f64>, beginning: Beginning) {
+    /// Puts every memory into the state from which it begins, and lets the first row of a recording pass.
+    fn begin(&mut self, first: &Context<f64>, stroke: &Context<f64>, beginning: Beginning) {
         let before = |law: &Info| beginning.concerns(law).then(|| Beginning::before(first, stroke, law));
+        let seen = |law: &Info| if beginning.concerns(law) { Beginning::first(first) } else { *first };
         self.chain.step_each(|effect| before(effect.info()));
+        self.chain.step_each(|effect| Some(seen(effect.info())));
         for (candidate, parameters, memory) in &mut self.corrections {
             if let Some(context) = before(candidate.info()) {
                 candidate.step(parameters, &context, memory);
             }
+            candidate.step(parameters, &seen(candidate.info()), memory);
         }
     }
 
     /// Lets the time of a row pass in every memory.
-    fn step(&mut self, row: &Context<f64>, beginning: Beginning) {
-        let seen = |law: &Info| if beginning.concerns(law) { Beginning::first(row) } else { *row };
-        self.chain.step_each(|effect| Some(seen(effect.info())));
+    fn step(&mut self, row: &Context<f64>) {
+        self.chain.step(row);
         for (candidate, parameters, memory) in &mut self.corrections {
-            candidate.step(parameters, &seen(candidate.info()), memory);
+            candidate.step(parameters, row, memory);
         }
     }
 
@@ -95,15 +97,15 @@ impl<'a> Model<'a> {
         let row = |muscle: &Muscle<f64>, i: usize| {
             muscle.context(&motions[i], Pressure::from_pascals(recording.pressure[i]))
         };
-        if !motions.is_empty() && beginning != Beginning::default() {
-            let first = row(&self.muscle, 0);
-            let stroke = (0..motions.len()).map(|i| row(&self.muscle, i)).find(is_stroke);
-            self.precede(&first, &stroke.unwrap_or(first), beginning);
-        }
         let mut forces = Vec::with_capacity(recording.len());
         for i in 0..motions.len() {
             let context = row(&self.muscle, i);
-            self.step(&context, if i == 0 { beginning } else { Beginning::default() });
+            if i == 0 && beginning != Beginning::default() {
+                let stroke = (0..motions.len()).map(|i| row(&self.muscle, i)).find(is_stroke);
+                self.begin(&context, &stroke.unwrap_or(context), beginning);
+            } else {
+                self.step(&context);
+            }
             // A slack muscle transmits no force; what the bench adds to the reading acts all the same.
             let (mut pull, mut read) = (context.force() + self.chain.force(&context), 0.0);
             for (candidate, parameters, memory) in &self.corrections {
