@@ -5,13 +5,11 @@ use std::borrow::Cow;
 use model_core::braid::Braid;
 use model_core::effects::{Context, Info, MEMORY};
 
-use super::baselines::{self, Baseline, Kind};
+use super::as_read::AsRead;
+use super::baselines::Kind;
 use super::candidates::Candidate;
-use super::criteria::baseline::TABLE_ORDER;
-use super::criteria::judgement::{CHECK_RESOLUTION, CHECKED_PROBABILITY, MATERIAL_FAULT};
-use super::cross_validation::HeldOutRows;
-use super::location::locate;
-use super::rows::{self, Rows};
+use super::criteria::judgement::{CHECKED_PROBABILITY, MATERIAL_FAULT};
+use super::rows::Rows;
 use super::verdict::{
     Considered, Diagnosis, Missing, Outcome, ParameterValue, PathStep, Remark, Verdict, Why, WhyNot,
 };
@@ -130,7 +128,7 @@ pub(super) struct BenchChecks {
     faults: Vec<Fault>,
     leak: Option<Leak>,
     /// The recordings as they were read, with one bladder for all pressures; only where a fault is present.
-    before: Option<(Rows, Baseline)>,
+    before: Option<AsRead>,
 }
 
 impl BenchChecks {
@@ -140,14 +138,14 @@ impl BenchChecks {
         if checks.is_empty() {
             return Ok(known);
         }
-        let (rows, fitted) = one_bladder(campaign, None, braid)?;
-        let rows = baselines::linearised(&rows, &fitted);
+        let read = AsRead::of(campaign, None, braid)?;
+        let rows = read.linearised();
         let blocked = rows.force.iter().copied().fold(0.0, f64::max);
         let material = |force: f64| force >= MATERIAL_FAULT * blocked;
         known.faults = checks.measured().iter().map(|m| Fault::of(m, &rows, material)).collect();
         known.leak = checks.loss().map(|loss| Leak::of(loss, &rows, material));
         if known.with(Finding::Present).next().is_some() {
-            known.before = Some((rows, fitted));
+            known.before = Some(read);
         }
         Ok(known)
     }
@@ -211,21 +209,14 @@ impl BenchChecks {
             diagnosis.remarks.extend(self.with(Finding::Present).map(Fault::remark));
             return Ok(diagnosis);
         }
-        let Some((rows, before)) = &self.before else { return Ok(diagnosis) };
-        let (freed_rows, after) = one_bladder(freed, as_read, braid)?;
-        let (was, is) = (before.per_row(rows), after.per_row(&freed_rows));
-        let noise = diagnosis.noise_N.powi(2);
-        let share =
-            ((was - is) / (was - noise).max(CHECK_RESOLUTION * was).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        for m in &mut diagnosis.missing {
-            m.share_explained *= 1.0 - share;
-        }
-        diagnosis.unexplained.share *= 1.0 - share;
+        let Some(before) = &self.before else { return Ok(diagnosis) };
+        let after = AsRead::of(freed, as_read, braid)?;
+        let removed = before.enter(&mut diagnosis, kind, &after);
         let present: Vec<&Fault> = self.with(Finding::Present).collect();
         let all: f64 = present.iter().map(|f| f.peak * f.peak).sum();
         let entries = present.iter().map(|f| Missing {
             given: given.contains(&f.law()),
-            ..f.missing(share * f.peak * f.peak / all.max(1e-300))
+            ..f.missing(removed.share * f.peak * f.peak / all.max(1e-300))
         });
         for entry in entries {
             // Sorted by peak force, whether a check or the recordings found it.
@@ -234,41 +225,14 @@ impl BenchChecks {
         }
         let step = |f: &&Fault| PathStep {
             effect: f.measured.fault.info().name.into(),
-            rms_N: is.sqrt(),
+            rms_N: removed.left,
             held_out_rms_N: None,
             p: f.chance(),
             runners_up: Vec::new(),
         };
         diagnosis.path.splice(0..0, present.iter().map(step));
-        diagnosis.misfit_rms_N = baselines::fit(rows, Kind::Flexible(TABLE_ORDER), &[]).rms(rows);
-        let unseen = HeldOutRows::new(rows, kind, &[]).held_out(&[], diagnosis.noise_N);
-        // Selected effects may need another split, whose errors are not comparable with this one's.
-        if unseen.split == diagnosis.held_out.split {
-            diagnosis.held_out.rms_before_N = unseen.rms_before_N;
-            diagnosis.held_out.with_turns_before_N = unseen.with_turns_before_N;
-        }
-        if diagnosis.verdict() == Verdict::Consistent {
-            diagnosis.outcome = Outcome::Judged(Verdict::Explained);
-            if rows.len() == freed_rows.len() {
-                (diagnosis.r#where, diagnosis.profiles) =
-                    locate(rows, &before.residual, &after.residual, diagnosis.noise_N, 7);
-            }
-        }
         Ok(diagnosis)
     }
-}
-
-/// Recordings with one bladder for all pressures; of corrected ones, with the readings as they were.
-fn one_bladder(
-    campaign: &Campaign,
-    as_read: Option<&Campaign>,
-    braid: &Braid<f64>,
-) -> Result<(Rows, Baseline)> {
-    let (rows, _) = rows::prepare_corrected(campaign, as_read, braid)?;
-    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-    let (rows, _) = baselines::without_slack(&rows, &fitted);
-    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-    Ok((rows, fitted))
 }
 
 /// Names an effect that a check shows and the recordings do not: it is there, and how much of the error it explains is not known.

@@ -13,13 +13,14 @@ use super::criteria::judgement::{
     EXPLAINED, EXPLAINED_REST, EXPLAINED_TURNS, EXPLAINED_UNSEEN, LACK_OF_FIT, LACK_OF_FIT_NOISE, LINE_ALPHA,
     LINE_SHARE, LINE_UNEXPLAINED, PARTLY_EXPLAINED, PLACE_SHARE, TRACE_POINTS,
 };
+use super::criteria::location::REGION_ALPHA;
 use super::criteria::rows::{NO_LOAD, SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
 use super::filtered_channels;
 use super::findings::{considered, missing};
 use super::known_effects;
 use super::linear::energy;
-use super::location::{block_ranges, locate};
+use super::location::{self, block_ranges, locate};
 use super::noise::Noise;
 use super::options::Options;
 use super::preconditions::{blocked_force, limitations, not_judged, unmet_precondition};
@@ -42,6 +43,18 @@ use pam_fit::bench::Candidate as Law;
 /// # Errors
 /// Recordings without force or without rows, or an impossible geometry.
 pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> Result<Diagnosis> {
+    with_baseline(campaign, geometry, options).map(|(diagnosis, _)| diagnosis)
+}
+
+/// The same, with the kind of the last baseline.
+///
+/// # Errors
+/// As [`diagnose`].
+pub(crate) fn with_baseline(
+    campaign: &Campaign,
+    geometry: &Geometry,
+    options: &Options,
+) -> Result<(Diagnosis, Kind)> {
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
     known_effects::check(&options.given)?;
     if campaign.samples() == 0 {
@@ -50,8 +63,9 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let known = BenchChecks::of(&options.checks, campaign, &braid)?;
     let freed = known.free(campaign);
     let as_read = known.corrects_the_stroke().then_some(campaign);
-    let answer = ask(&freed, as_read, &braid, options, &known)?;
-    known.enter(answer, &options.given, (&freed, as_read), &braid)
+    let (answer, kind) = ask(&freed, as_read, &braid, options, &known)?;
+    let diagnosis = known.enter((answer, kind), &options.given, (&freed, as_read), &braid)?;
+    Ok((diagnosis, kind))
 }
 
 /// The answer of the recordings, corrected for what checks of the bench measured; with the kind of the last baseline.
@@ -275,13 +289,14 @@ impl Located {
         let (rows, sigma) = (&selection.rows, selection.noise.sigma);
         let line = spectrum::line(rows, &selection.joint.residual, &block_ranges(rows), step, 9)
             .filter(|l| l.p <= LINE_ALPHA && l.share >= LINE_SHARE);
-        let (mut regions, profiles) =
+        let location::Located { mut regions, profiles, .. } =
             locate(rows, &selection.base_alone.residual, &selection.joint.residual, sigma, 7);
-        let (left_regions, _) = locate(rows, &selection.joint.residual, &selection.joint.residual, sigma, 8);
-        let pattern = match (&line, left_regions.first()) {
+        let left = locate(rows, &selection.joint.residual, &selection.joint.residual, sigma, 8);
+        // Noise that lasts is larger in one place than in another by chance.
+        let is_place = |r: &Region| !excess.lasts || r.share >= PLACE_SHARE && left.p <= REGION_ALPHA;
+        let pattern = match (&line, left.regions.first()) {
             (Some(l), _) => Pattern::Periodic(l.hertz),
-            // Noise that lasts is larger in one place than in another by chance.
-            (None, Some(r)) if excess.left > excess.admitted && !(excess.lasts && r.share < PLACE_SHARE) => {
+            (None, Some(r)) if excess.left > excess.admitted && is_place(r) => {
                 Pattern::Region(Box::new(r.clone()))
             }
             _ if excess.restless => Pattern::NotRepeatable(selection.noise.scatter(blocked)),

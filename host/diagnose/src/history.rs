@@ -62,7 +62,7 @@ use pam_data::recording::Campaign;
 
 use self::additional_effect::{AdditionalEffect, Column};
 use self::campaign::Points;
-use self::criteria::{MEMORY_SINGLE_TIMES, TIMES};
+use self::criteria::{LEAST_POINTS, MEMORY_SINGLE_TIMES, TIMES};
 use self::friction::Instead;
 use self::law::{Law, Layer};
 use self::run_offset::Event;
@@ -146,6 +146,20 @@ pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
     let regions = places::regions(&points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
     let slack_reading = fits.slack_reading.clone();
     Some(Found { answer, regions, shifts, peak, needed: fits.needed.clone(), slack_reading })
+}
+
+/// What the load cell reads of a slack muscle, in any campaign at held lengths; `None` with fewer than two mountings that are slack at some
+/// pressure.
+fn slack_reading(campaign: &Campaign, geometry: &Geometry) -> Option<SlackReading> {
+    let points = campaign::held_points(campaign, geometry.rest_length.metres())?;
+    if (points.len() as f64) < LEAST_POINTS || points.largest_force() <= 0.0 {
+        return None;
+    }
+    let first = slack_reading::of(&points, &law::thresholds(&points))?;
+    // The pull seems to begin at another pressure where the zero is off.
+    let freed =
+        Points { force: points.force.iter().map(|f| f - first.zero_read()).collect(), ..points.clone() };
+    slack_reading::of(&points, &law::thresholds(&freed))
 }
 
 fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {

@@ -11,6 +11,7 @@
 //! | rows | `rows` | averages samples between reversals, with the motion in each; finds levels, blocks, vented rows |
 //! | | `valve_pulses` | finds the readings that ring after the pulses of a valve; they are set aside |
 //! | | `bench_checks` | corrects faults that checks of the bench measured, and enters them into the answer |
+//! | | `as_read` | what a correction of the readings changes in an answer |
 //! | | `preconditions` | says what can be judged |
 //! | base model | `baselines` | tables free over pressure; one bladder for all pressures; one that may differ a little |
 //! | | `rest_friction` | finds the law of friction at held length |
@@ -36,6 +37,7 @@
 //!
 //! Everything is computed in a fixed order with fixed seeds: the same recordings give the same answer on any number of threads.
 
+mod as_read;
 mod baselines;
 mod beginnings;
 mod bench_checks;

@@ -136,16 +136,18 @@ fn smoothed(rows: &Rows, residual: &[f64], half: usize) -> Vec<f64> {
     out
 }
 
-/// The error along every coordinate: significant regions, strongest first, and profiles for pictures.
-///
-/// `before` and `after` are weighted residuals without and with the named effects.
-pub(crate) fn locate(
-    rows: &Rows,
-    before: &[f64],
-    after: &[f64],
-    sigma: f64,
-    seed: u64,
-) -> (Vec<Region>, Vec<Profile>) {
+/// Where the error is along every coordinate.
+pub(crate) struct Located {
+    /// Significant regions, strongest first.
+    pub regions: Vec<Region>,
+    /// For pictures.
+    pub profiles: Vec<Profile>,
+    /// How often whole blocks, shuffled, concentrate as much along any of the coordinates as the error does along its most significant one.
+    pub p: f64,
+}
+
+/// Locates the error; `before` and `after` are weighted residuals without and with the named effects.
+pub(crate) fn locate(rows: &Rows, before: &[f64], after: &[f64], sigma: f64, seed: u64) -> Located {
     let smooth = smoothed(rows, before, REGION_SMOOTHING);
     let mut excess: Vec<f64> = smooth.iter().map(|s| s * s).collect();
     // Noise that the smoothing leaves; independent rows would leave a fifth.
@@ -156,7 +158,7 @@ pub(crate) fn locate(
     }
     let blocks = block_ranges(rows);
     let steady = (energy(before) / energy(rows.root_weight()).max(1e-12)).sqrt();
-    let found: Vec<(Option<Region>, Profile)> = coordinates(rows)
+    let found: Vec<(Option<Standing>, Profile)> = coordinates(rows)
         .par_iter()
         .filter_map(|c| {
             let edges = edges(&c.values, rows.root_weight(), c.discrete);
@@ -168,13 +170,47 @@ pub(crate) fn locate(
             Some((region, binned.profile(rows, c, before, after)))
         })
         .collect();
-    let (regions, profiles): (Vec<Option<Region>>, Vec<Profile>) = found.into_iter().unzip();
-    let mut regions: Vec<Region> = regions.into_iter().flatten().collect();
+    let (standing, profiles): (Vec<Option<Standing>>, Vec<Profile>) = found.into_iter().unzip();
+    let standing: Vec<Standing> = standing.into_iter().flatten().collect();
+    let p = family_p(&standing);
+    let mut regions: Vec<Region> = standing.into_iter().map(|s| s.region).collect();
     let strength = |r: &Region| (r.share - r.rows) / (r.rows * (1.0 - r.rows)).max(REGION_VARIANCE).sqrt();
     regions.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     regions.retain(|r| r.p <= REGION_ALPHA);
     regions.truncate(MOST_REGIONS);
-    (regions, profiles)
+    Located { regions, profiles, p }
+}
+
+/// A region that stands out, beside what shuffled blocks make along the same coordinate.
+struct Standing {
+    region: Region,
+    /// How much the region stands out.
+    strength: f64,
+    /// The same of each shuffle; the shuffles of all coordinates are the same.
+    shuffled: Vec<f64>,
+}
+
+impl Standing {
+    /// A strength in standard deviations of the shuffles.
+    fn standardised(&self, strength: f64) -> f64 {
+        let n = self.shuffled.len() as f64;
+        let mean = self.shuffled.iter().sum::<f64>() / n;
+        let variance = self.shuffled.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
+        (strength - mean) / variance.sqrt().max(f64::MIN_POSITIVE)
+    }
+}
+
+/// The p-value of the most significant of all coordinates; one without any.
+///
+/// Westfall and Young, Resampling-Based Multiple Testing, 1993: the largest standardised statistic of the same shuffles.
+fn family_p(standing: &[Standing]) -> f64 {
+    let largest = |of: &dyn Fn(&Standing) -> f64| {
+        standing.iter().map(|s| s.standardised(of(s))).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let observed = largest(&|s| s.strength);
+    let beyond =
+        (0..REGION_SHUFFLES).filter(|shuffle| largest(&|s| s.shuffled[*shuffle]) >= observed).count();
+    (beyond as f64 + 1.0) / (REGION_SHUFFLES as f64 + 1.0)
 }
 
 /// The rows in the bins of a coordinate.
@@ -239,18 +275,17 @@ impl Binned {
         excess: &[f64],
         blocks: &[(usize, usize)],
         seed: u64,
-    ) -> Option<Region> {
+    ) -> Option<Standing> {
         let energy_in = self.energy_in(excess);
         let (a, b, strength) = best_run(&energy_in, &self.rows_in);
         if strength <= 0.0 {
             return None;
         }
         let mut random = Random(seed);
-        let mut as_good = 0;
-        for _ in 0..REGION_SHUFFLES {
-            let shuffled = shuffled(excess, blocks, &mut random);
-            as_good += usize::from(best_run(&self.energy_in(&shuffled), &self.rows_in).2 >= strength);
-        }
+        let shuffled: Vec<f64> = (0..REGION_SHUFFLES)
+            .map(|_| best_run(&self.energy_in(&shuffled(excess, blocks, &mut random)), &self.rows_in).2)
+            .collect();
+        let as_good = shuffled.iter().filter(|s| **s >= strength).count();
         let share = energy_in[a..b].iter().sum::<f64>() / energy_in.iter().sum::<f64>();
         let part = self.rows_in[a..b].iter().sum::<f64>() / self.rows_in.iter().sum::<f64>();
         let (low, high) = (self.edges[a], self.edges[b]);
@@ -261,7 +296,7 @@ impl Binned {
         } else {
             (low, high)
         };
-        Some(Region {
+        let region = Region {
             coordinate: c.name.into(),
             from,
             to,
@@ -270,7 +305,8 @@ impl Binned {
             p: (as_good as f64 + 1.0) / (REGION_SHUFFLES as f64 + 1.0),
             unit: c.unit.into(),
             recordings: if c.name == "recording" { names(rows, from, to) } else { Vec::new() },
-        })
+        };
+        Some(Standing { region, strength, shuffled })
     }
 }
 
@@ -321,4 +357,45 @@ pub(crate) fn block_ranges(rows: &Rows) -> Vec<(usize, usize)> {
         }
     }
     ranges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rows::prepare;
+    use crate::tests::{coloured, geometry, loops, recorded};
+
+    /// The located weighted residual: noise of 1 N with a memory of 6 s, and a bump of this size (N) in the middle of the contraction.
+    fn located(rows: &Rows, bump: f64, seed: u64) -> Located {
+        let mut random = Random(seed);
+        let mut state = [0.0; 2];
+        let noise = coloured(1.0, 6.0);
+        let largest = rows.contexts().iter().map(|c| c.contraction).fold(0.0, f64::max);
+        let added =
+            |i: usize| bump * (-(20.0 * (rows.contexts()[i].contraction / largest - 0.5)).powi(2)).exp();
+        let residual: Vec<f64> = (0..rows.len())
+            .map(|i| rows.root_weight()[i] * (noise(&mut random, &mut state) + added(i)))
+            .collect();
+        locate(rows, &residual, &residual, 0.3, 8)
+    }
+
+    #[test]
+    fn noise_that_lasts_has_no_place_and_a_bump_has_one() {
+        let campaign = recorded(loops(&[0.4]), 4, |_, _| 0.0, |_, _, _| 0.0);
+        let (rows, _) = prepare(&campaign, &geometry().build().expect("a braid")).expect("rows");
+        const SEEDS: u64 = 12;
+        let noise: Vec<Located> = (1..=SEEDS).map(|seed| located(&rows, 0.0, seed)).collect();
+        let along_one = noise.iter().filter(|l| !l.regions.is_empty()).count();
+        let along_any = noise.iter().filter(|l| l.p <= REGION_ALPHA).count();
+        assert!(along_one > 2 * along_any && along_any <= 3, "{along_one} {along_any} of {SEEDS}");
+        for seed in 1..=3 {
+            let l = located(&rows, 6.0, seed);
+            assert!(
+                l.p <= REGION_ALPHA && l.regions[0].coordinate == "contraction",
+                "{} {:?}",
+                l.p,
+                l.regions
+            );
+        }
+    }
 }

@@ -21,7 +21,7 @@ use super::outcome::Verdict;
 use super::protocol_simulation::{Place, Protocol, Step, play};
 use super::remark::Remark;
 use super::why::Why;
-use super::{Diagnosis, Options, diagnose, refitted_table};
+use super::{Diagnosis, Options, diagnose, history, refitted_table};
 use pam_data::muscle_description::{Kind, MuscleDescription};
 use pam_data::recording::{Campaign, Recording};
 use pam_data::statistics::quantile;

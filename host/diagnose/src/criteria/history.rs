@@ -94,6 +94,9 @@ pam_data::criteria! {
     /// The reading of a slack muscle is one of its zero only if it changes by less than this share of itself over the pressures at which it
     /// is taken: a pull that begins softly doubles there.
     SLACK_FLAT: f64 = 0.6, "r_flat", "1", Derived("from a to 2a the change is 0.67 of the mean");
+    /// ... if it differs by less than this share of itself between filling and emptying, and a vented muscle reads more than this share of it in
+    /// every mounting.
+    SLACK_SAME: f64 = 0.4, "r_same", "1", Derived("a zero is the same; friction of a guide that the first length does not have makes a difference of 1");
     /// ... and if a ramp beyond the pressure from which the muscle seems to pull the slope has this share of its final value.
     SLACK_KNEE: f64 = 0.7, "q_knee", "1", Derived("a pull that begins over 100 kPa has 0.6 of it, one over 25 kPa 0.9");
     /// A load cell reads the pressure only if the slope of its readings grows by less than this factor from the lower to the upper half of the

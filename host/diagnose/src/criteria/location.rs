@@ -8,8 +8,9 @@ pam_data::criteria! {
     DISCRETE_BINS: usize = 4, "n_value/n_bin", "1", Judgement;
     /// Shuffles of the blocks behind a p-value of a region.
     REGION_SHUFFLES: usize = 199, "n_shuffle", "1", Derived("p = 0.05 is then known to 0.015");
-    /// A region is reported up to this p.
-    REGION_ALPHA: f64 = 0.05, "p_region", "1", Convention("5 %, one coordinate at a time");
+    /// A region is reported up to this p of its coordinate. Of an error that lasts like noise it is the place up to this p of all
+    /// coordinates together.
+    REGION_ALPHA: f64 = 0.05, "p_region", "1", Convention("5 %");
     /// Regions reported at most.
     MOST_REGIONS: usize = 6, "n_region", "1", Cost;
     /// A region holds less than this share of the rows.

@@ -73,6 +73,16 @@ impl Points {
         self.force.iter().copied().fold(0.0, f64::max)
     }
 
+    /// Whether they are of isometric staircases with repeated runs, and enough of both.
+    fn have_repeated_runs(&self) -> bool {
+        let whole = range(&self.pressure);
+        let covers = |r: &Run| range(&self.pressure[r.points.0..r.points.1]) >= LEAST_SPAN * whole;
+        let repeated = self.mountings.iter().any(|m| m.runs.len() >= 2);
+        let enough = self.len() as f64 >= LEAST_POINTS && self.runs.len() as f64 >= LEAST_RUNS;
+        let staircase = whole > 0.0 && self.runs.iter().all(covers) && self.largest_force() > 0.0;
+        repeated && enough && staircase
+    }
+
     /// The mounting with the largest length.
     pub(super) fn longest(&self) -> usize {
         (0..self.mountings.len())
@@ -103,9 +113,14 @@ impl Points {
 }
 
 /// Reads the structure of a campaign; `None` where it is not a campaign of isometric staircases with repeated runs.
+pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
+    held_points(campaign, rest_length).filter(Points::have_repeated_runs)
+}
+
+/// Reads the structure of a campaign; `None` where the length was not held throughout.
 ///
 /// A run is one recording; for mountings see [`Campaign::mountings`].
-pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
+pub(super) fn held_points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
     let mut points = Points::default();
     let mountings = campaign.mountings()?;
     for (index, recording) in campaign.recordings.iter().enumerate() {
@@ -124,12 +139,7 @@ pub(super) fn points(campaign: &Campaign, rest_length: f64) -> Option<Points> {
         points.averaged |= averaged;
         add(&mut points, campaign, index, &settled);
     }
-    let whole = range(&points.pressure);
-    let covers = |r: &Run| range(&points.pressure[r.points.0..r.points.1]) >= LEAST_SPAN * whole;
-    let repeated = points.mountings.iter().any(|m| m.runs.len() >= 2);
-    let enough = points.len() as f64 >= LEAST_POINTS && points.runs.len() as f64 >= LEAST_RUNS;
-    let staircase = whole > 0.0 && points.runs.iter().all(covers) && points.largest_force() > 0.0;
-    (repeated && enough && staircase).then_some(points)
+    Some(points)
 }
 
 fn add(points: &mut Points, campaign: &Campaign, index: usize, settled: &[Point]) {

@@ -6,14 +6,15 @@ use super::additional_effect::AdditionalEffect;
 use super::criteria::{ENTER_EXPLAINED, ENTER_RESOLVED, MOST_LOST};
 use super::entries::is_from_history;
 use super::slack_reading::SlackReading;
-use super::{Found, entries, found};
+use super::{Found, entries, found, slack_reading};
+use crate::as_read::AsRead;
 use crate::baselines::{self, Kind};
 use crate::criteria::judgement::PARTLY_EXPLAINED;
-use crate::diagnosis::diagnose as statically;
+use crate::diagnosis::{diagnose as statically, with_baseline};
 use crate::options::Options;
 use crate::remark::Remark;
 use crate::rows;
-use crate::verdict::{Considered, Diagnosis, HeldOut, Outcome, Split, Verdict, WhyNot};
+use crate::verdict::{Considered, Diagnosis, HeldOut, Missing, Outcome, Split, Verdict, WhyNot};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
 use pam_data::recording::dropouts::Screened;
@@ -31,7 +32,8 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let screened = Screened::of(campaign);
     let reliable = reliable(&screened);
     let Some(found) = found(&reliable, geometry) else {
-        return statically(campaign, geometry, options);
+        let reading = slack_reading(&reliable, geometry).filter(|_| options.given.is_empty());
+        return beside_slack_reading(campaign, geometry, options, reading.as_ref());
     };
     // What the user gives as known is fitted as it is, to the recordings as they are.
     if !options.given.is_empty() {
@@ -44,7 +46,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     if !found.answer.named {
         let mut diagnosis = statically(&corrected(campaign.clone(), slack_reading), geometry, options)?;
         enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
-        enter_slack_reading(&mut diagnosis, slack_reading);
+        enter_slack_reading(&mut diagnosis, slack_reading, 0.0);
         diagnosis.history = Some(found.answer);
         return Ok(diagnosis);
     }
@@ -52,7 +54,7 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     let freed = corrected(without_memory(&reliable, &found), slack_reading);
     let mut diagnosis = statically(&freed, geometry, options)?;
     enter(&mut diagnosis, found);
-    enter_slack_reading(&mut diagnosis, slack_reading);
+    enter_slack_reading(&mut diagnosis, slack_reading, 0.0);
     // The failures were taken out before.
     if let Some(failures) = screened.remark() {
         diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
@@ -61,6 +63,31 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     if let Some(misfit) = misfit(&reliable, &braid)? {
         diagnosis.misfit_rms_N = misfit;
     }
+    Ok(diagnosis)
+}
+
+/// The answer of recordings without what the load cell reads of a slack muscle, with that reading.
+fn beside_slack_reading(
+    campaign: &Campaign,
+    geometry: &Geometry,
+    options: &Options,
+    reading: Option<&SlackReading>,
+) -> Result<Diagnosis> {
+    if !reading.is_some_and(|r| r.found) {
+        // Most are not corrected: they are not copied.
+        let mut diagnosis = statically(campaign, geometry, options)?;
+        enter_slack_reading(&mut diagnosis, reading, 0.0);
+        return Ok(diagnosis);
+    }
+    let freed = corrected(campaign.clone(), reading);
+    let (mut diagnosis, kind) = with_baseline(&freed, geometry, options)?;
+    let mut explained = 0.0;
+    if diagnosis.judged() {
+        let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
+        let (before, after) = (AsRead::of(campaign, None, &braid)?, AsRead::of(&freed, None, &braid)?);
+        explained = before.enter(&mut diagnosis, kind, &after).share;
+    }
+    enter_slack_reading(&mut diagnosis, reading, explained);
     Ok(diagnosis)
 }
 
@@ -176,12 +203,12 @@ fn enter_needed(diagnosis: &mut Diagnosis, needed: Option<&AdditionalEffect>, le
     diagnosis.outcome = Outcome::Judged(verdict);
 }
 
-/// What a slack muscle shows: an error of the load cell, and limits of others. What is named now is not among the effects that were
-/// considered.
-fn enter_slack_reading(diagnosis: &mut Diagnosis, reading: Option<&SlackReading>) {
+/// What a slack muscle shows: an error of the load cell, with the share of the error that it explains, and limits of others. What is named
+/// now is not among the effects that were considered.
+fn enter_slack_reading(diagnosis: &mut Diagnosis, reading: Option<&SlackReading>, explained: f64) {
     if let Some(reading) = reading.filter(|r| r.found && diagnosis.judged()) {
         diagnosis.missing.retain(|m| m.effect != reading.effect.info().name);
-        diagnosis.missing.push(entries::slack_reading(reading));
+        diagnosis.missing.push(Missing { share_explained: explained, ..entries::slack_reading(reading) });
         if diagnosis.verdict() == Verdict::Consistent {
             diagnosis.outcome = Outcome::Judged(Verdict::Explained);
         }

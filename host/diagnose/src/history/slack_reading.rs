@@ -13,11 +13,12 @@ use pam_fit::bench::{BenchName, Candidate};
 use super::answer::{Estimate, Finding, FindingDetail};
 use super::campaign::Points;
 use super::criteria::{
-    PULLS, RAMP, SLACK_FLAT, SLACK_FOLLOWS, SLACK_KNEE, SLACK_PART, SLACK_POINTS, SLACK_RANGE,
+    PULLS, RAMP, SLACK_FLAT, SLACK_FOLLOWS, SLACK_KNEE, SLACK_PART, SLACK_POINTS, SLACK_RANGE, SLACK_SAME,
     SLACK_STRAIGHT, THRESHOLD_FROM, THRESHOLD_TO,
 };
 use super::findings::Contrast;
 use super::shift_fit;
+use crate::criteria::rows::{VENTED_PRESSURE, VENTED_SHARE};
 
 /// Readings of a slack muscle.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,10 +54,7 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
             .filter(|i| points.mounting[*i] == m && almost_pulls(points, thresholds, *i))
             .collect()
     };
-    let read = by_mounting(&|m| {
-        let mut read: Vec<f64> = almost(m).iter().map(|i| points.force[*i]).collect();
-        (read.len() >= SLACK_POINTS).then(|| median(&mut read))
-    });
+    let read = by_mounting(&|m| reading(points, almost(m)));
     let rises = by_mounting(&|m| {
         let own = almost(m);
         (own.len() >= SLACK_POINTS).then(|| RAMP * slope(points, &own))
@@ -85,7 +83,11 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
         });
     }
     let flat = rise.abs() < SLACK_FLAT * zero.mean.abs();
-    let found = least_alike(&read) != 0.0 && zero.mean.abs() > material && flat && sharp;
+    let constant = turns(points, &almost).abs() < SLACK_SAME * zero.mean.abs()
+        && read_of_vented(points)
+            .iter()
+            .all(|v| (v - zero.mean).abs() < (1.0 - SLACK_SAME) * zero.mean.abs());
+    let found = least_alike(&read) != 0.0 && zero.mean.abs() > material && flat && sharp && constant;
     // A mounting at full length is never slack: when the zero went off is not known.
     let mut confusable = vec![BenchName::ForceDrift, BenchName::Gravity];
     confusable.extend((least.abs() > material).then_some(BenchName::CrossTalk));
@@ -98,6 +100,34 @@ pub(super) fn of(points: &Points, thresholds: &[f64]) -> Option<SlackReading> {
         found,
         limits,
     })
+}
+
+/// Median of the force at some points, N; `None` of too few.
+fn reading(points: &Points, at: impl IntoIterator<Item = usize>) -> Option<f64> {
+    let mut read: Vec<f64> = at.into_iter().map(|i| points.force[i]).collect();
+    (read.len() >= SLACK_POINTS).then(|| median(&mut read))
+}
+
+/// How much more the cell reads while the muscle is filled than while it is emptied, N: a memory of the bladder and friction differ by
+/// direction, a zero does not.
+fn turns(points: &Points, almost: &dyn Fn(usize) -> Vec<usize>) -> f64 {
+    let difference = |m: usize| {
+        let [filling, emptying] = [1, -1].map(|direction| {
+            reading(points, almost(m).into_iter().filter(|i| points.direction[*i] == direction))
+        });
+        Some(filling? - emptying?)
+    };
+    let all: Vec<f64> = (0..points.mountings.len()).filter_map(difference).collect();
+    Contrast::of(&all).map_or(0.0, |c| c.mean)
+}
+
+/// What the cell reads of the vented muscle in each mounting, N. At full length a muscle is never slack under pressure; vented, it shows
+/// whether the zero is the same there, too: what a guide holds back after the length was changed is not.
+fn read_of_vented(points: &Points) -> Vec<f64> {
+    let limit = 1e-3 * VENTED_PRESSURE.min(1e3 * VENTED_SHARE * points.highest());
+    let vented = |m: usize, i: &usize| points.mounting[*i] == m && points.pressure[*i] < limit;
+    let read = |m: usize| reading(points, (0..points.len()).filter(|i| vented(m, i)));
+    (0..points.mountings.len()).filter_map(read).collect()
 }
 
 /// What the intervals include, and what a tube makes that pushes, hangs or lifts.
@@ -170,9 +200,14 @@ fn slope(points: &Points, at: &[usize]) -> f64 {
 }
 
 impl SlackReading {
+    /// The zero of the cell as it was read, N, whether it matters or not; 0 where the reading follows the pressure.
+    pub(super) fn zero_read(&self) -> f64 {
+        if self.effect == BenchName::ForceOffset { self.mean.mean } else { 0.0 }
+    }
+
     /// The zero of the cell, N; 0 where the reading follows the pressure.
     pub(super) fn zero(&self) -> f64 {
-        if self.found && self.effect == BenchName::ForceOffset { self.mean.mean } else { 0.0 }
+        if self.found { self.zero_read() } else { 0.0 }
     }
 
     /// The cell's reading per pressure, N/Pa; 0 where it does not follow the pressure.

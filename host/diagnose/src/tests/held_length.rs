@@ -72,3 +72,47 @@ fn beside_such_friction_a_slow_gauge_is_found() {
         d.unexplained
     );
 }
+
+/// One recording of ramps at each of three lengths; the muscle is slack at low pressures where it is shortened. The load cell reads `zero`
+/// (N) too much.
+fn at_three_lengths(zero: f64, seed: u64) -> Campaign {
+    let mut random = Random(seed);
+    let muscle = muscle();
+    let recordings = [0.0, 4e-3, 8e-3].map(|stroke| {
+        let mut r = protocol().recordings.swap_remove(0);
+        let mut friction = 0.0_f64;
+        let mut before = 0.0;
+        let force = r.pressure.iter().map(|p| {
+            friction = (friction + (p - before) / 20e3).clamp(-1.0, 1.0);
+            before = *p;
+            let quasi = muscle.force(Pressure::from_pascals(*p), Length::from_metres(stroke), 0.0).newtons();
+            quasi.max(0.0) * (1.0 - 0.08 * friction) + zero + 0.03 * random.normal()
+        });
+        r.force = Some(force.collect());
+        r.stroke.fill(stroke);
+        r.name = format!("{stroke}");
+        r
+    });
+    Campaign::new(recordings.to_vec())
+}
+
+#[test]
+fn the_zero_of_the_load_cell_is_read_of_a_slack_muscle() {
+    let ask = |campaign: &Campaign| {
+        history::diagnose(campaign, &geometry(), &Options::default()).expect("an answer")
+    };
+    for (zero, seed) in [(0.0, 1), (8.0, 2), (-8.0, 3)] {
+        let d = ask(&at_three_lengths(zero, seed));
+        let found = d.missing.iter().find(|m| m.effect == "force-offset");
+        if zero == 0.0 {
+            assert!(d.missing.is_empty(), "{:?}", names(&d));
+            continue;
+        }
+        let found = found.unwrap_or_else(|| panic!("{zero} N: {:?} {:?}", names(&d), d.unexplained));
+        assert!((found.parameters[0].value / zero - 1.0).abs() < 0.05, "{found:?}");
+        assert!(found.share_explained > 0.1, "{found:?}");
+        assert_eq!(names(&d), ["force-offset"]);
+        assert_eq!(d.verdict(), Verdict::Explained, "{:?}", d.unexplained);
+        assert!(d.held_out.rms_after_N < 0.75 * d.held_out.rms_before_N, "{:?}", d.held_out);
+    }
+}

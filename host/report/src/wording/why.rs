@@ -16,8 +16,7 @@ pub(crate) fn why(why: &Why) -> String {
             100.0 * least_gain,
         ),
         Why::SlackReading { reading, mountings, follows_pressure: false } => format!(
-            "while the muscle is slack, the load cell reads {reading:.1} N, with the same sign in all {mountings} mountings; curves of force \
-             over pressure do not depend on it"
+            "while the muscle is slack, the load cell reads {reading:.1} N, with the same sign in all {mountings} mountings"
         ),
         Why::SlackReading { reading, mountings, follows_pressure: true } => format!(
             "while the muscle is slack, the reading of the load cell grows with the pressure in all {mountings} mountings; the least slope \
