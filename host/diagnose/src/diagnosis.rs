@@ -17,7 +17,7 @@ use super::criteria::location::REGION_ALPHA;
 use super::criteria::rows::{NO_LOAD, SLACK_MENTIONED, SLACK_ROUNDS};
 use super::cross_validation::HeldOutRows;
 use super::filtered_channels;
-use super::findings::{considered, missing};
+use super::findings::{considered, missing, unconfirmed};
 use super::known_effects;
 use super::linear::energy;
 use super::location::{self, block_ranges, locate};
@@ -371,6 +371,7 @@ fn answer(
     let sigma = selection.noise.sigma;
     let consistent = verdict == Verdict::Consistent;
     let considered = considered(&selection, &library, &missing, sigma, blocked);
+    let unconfirmed = unconfirmed(&selection, &library);
     let name = |candidate: usize| library[candidate].name().to_owned();
     let path = selection.selected.iter().zip(steps).map(|(t, step)| PathStep {
         effect: name(t.fit.candidate),
@@ -390,6 +391,7 @@ fn answer(
         unexplained: Unexplained {
             share: if consistent { 0.0 } else { 1.0 - excess.explained },
             pattern: located.pattern,
+            unconfirmed,
         },
         held_out,
         next_experiment: None,

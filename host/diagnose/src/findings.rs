@@ -8,13 +8,13 @@ use super::criteria::candidates::{LEAST_SIGMA, SYSTEMATIC_ROWS};
 use super::criteria::judgement::{ABSURD_SIZE, DETECTION, DETECTION_ROWS, SIZE_STEP};
 use super::criteria::selection::{
     CONCEALED, FAMILY_ALPHA, LEAST_SCORE, LEAST_SHARE, MOST_REPORTED, REPORTED_COMPETITOR, SELECTION_FLOOR,
-    STATIC_MOVED, STATIC_PEAK,
+    STATIC_MOVED, STATIC_PEAK, UNCONFIRMED_SHARE,
 };
 use super::intervals::deviations;
 use super::linear::energy;
 use super::rows::Rows;
 use super::selection_step::{self, Selection};
-use super::verdict::{Considered, Missing, ParameterValue, Why, WhyNot, is_relevant};
+use super::verdict::{Considered, Missing, ParameterValue, Unconfirmed, Why, WhyNot, is_relevant};
 use super::why::{Chance, Evidence};
 
 /// The selected effects with parameters and intervals, what they cannot be distinguished from, and their probabilities.
@@ -91,6 +91,20 @@ fn nameable(t: &CandidateFit, law_error: f64, selection: &Selection, sigma: f64,
         }
     }
     size
+}
+
+/// The candidates that would remove much of the error, strongest first. What tables imitate is not among them.
+pub(crate) fn unconfirmed(selection: &Selection, library: &[Candidate]) -> Vec<Unconfirmed> {
+    let share = |t: &CandidateFit| t.gain / t.before.max(f64::MIN_POSITIVE);
+    let fits = |t: &&CandidateFit| share(t) >= UNCONFIRMED_SHARE && t.beyond_tables >= CONCEALED;
+    let mut found: Vec<&CandidateFit> = selection.first_scan.iter().filter(fits).collect();
+    found.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    let unconfirmed = |t: &CandidateFit| Unconfirmed {
+        effect: library[t.candidate].name().into(),
+        share: share(t).min(1.0),
+        parameters: t.amplitudes.iter().chain(&t.shapes).copied().collect(),
+    };
+    found.into_iter().take(MOST_REPORTED).map(unconfirmed).collect()
 }
 
 /// The candidates that were not selected: the share they would explain, the size at which they could be hidden, and what would show them.

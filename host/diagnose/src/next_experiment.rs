@@ -34,7 +34,36 @@ fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<
     sum
 }
 
-/// The recording of the menu in which the named effect and those it is confused with differ most for its cost.
+/// Effects of which the recordings do not say which it is.
+struct OpenQuestion {
+    effect: String,
+    /// Its numbers in the law's order, SI.
+    parameters: Vec<f64>,
+    others: Vec<String>,
+}
+
+impl OpenQuestion {
+    /// The first name that others could have; or, where nothing is named, the effects that fit the error as well as slow noise does.
+    fn of(diagnosis: &Diagnosis) -> Option<Self> {
+        let open = |m: &&Missing| !m.confusable_with.is_empty() && !is_from_history(m);
+        if let Some(m) = diagnosis.missing.iter().find(open) {
+            return Some(Self {
+                effect: m.effect.clone(),
+                parameters: m.parameters.iter().map(|p| p.value).collect(),
+                others: m.confusable_with.clone(),
+            });
+        }
+        let (first, others) = diagnosis.unconfirmed().split_first()?;
+        (!others.is_empty()).then(|| Self {
+            effect: first.effect.clone(),
+            parameters: first.parameters.clone(),
+            others: others.iter().map(|u| u.effect.clone()).collect(),
+        })
+    }
+}
+
+/// The recording of the menu in which the named effect and those it is confused with differ most for its cost; where nothing is named, the
+/// effects that would remove much of the error.
 ///
 /// # Errors
 /// None in practice; a protocol of the menu that cannot be played is passed over.
@@ -44,14 +73,10 @@ pub fn next_experiment(
     low: f64,
     high: f64,
 ) -> Result<Option<NextExperiment>> {
-    let open = |m: &&Missing| !m.confusable_with.is_empty() && !is_from_history(m);
-    let Some(first) = diagnosis.missing.iter().find(open) else {
-        return Ok(None);
-    };
-    let Some(law) = Candidate::from_name(&first.effect) else { return Ok(None) };
-    let competitors: Vec<Candidate> =
-        first.confusable_with.iter().filter_map(|n| Candidate::from_name(n)).collect();
-    let values: Vec<f64> = first.parameters.iter().map(|p| p.value).collect();
+    let Some(open) = OpenQuestion::of(diagnosis) else { return Ok(None) };
+    let Some(law) = Candidate::from_name(&open.effect) else { return Ok(None) };
+    let competitors: Vec<Candidate> = open.others.iter().filter_map(|n| Candidate::from_name(n)).collect();
+    let values = &open.parameters;
     let (amplitudes, shape) = values.split_at(law.amplitudes().len().min(values.len()));
     let tried: Vec<Option<(f64, f64, String, Motion)>> = menu(muscle, low, high)
         .par_iter()
@@ -86,8 +111,8 @@ pub fn next_experiment(
         })
         .collect();
     let best = tried.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
-    let mut separates = vec![first.effect.clone()];
-    separates.extend(first.confusable_with.iter().cloned());
+    let mut separates = vec![open.effect];
+    separates.extend(open.others);
     Ok(best.map(|(_, difference, protocol, motion)| {
         let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
         let check = bench_check(&separates);

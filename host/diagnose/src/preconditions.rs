@@ -89,7 +89,7 @@ pub(super) fn not_judged(
         misfit_rms_N: 0.0,
         r#where: Vec::new(),
         missing: Vec::new(),
-        unexplained: Unexplained { share: 0.0, pattern: Pattern::None },
+        unexplained: Unexplained { share: 0.0, pattern: Pattern::None, unconfirmed: Vec::new() },
         held_out: HeldOut {
             split: Split::NothingFitted,
             rms_before_N: 0.0,

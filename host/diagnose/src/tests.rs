@@ -154,6 +154,7 @@ fn strokes_that_do_not_repeat_are_not_consistent() {
         assert_eq!((d.verdict(), names(&d)), (verdict, vec![]), "{share}: {:?}", d.remarks);
         let said = d.remarks.iter().any(|r| matches!(r, Remark::NotRepeatable(_)));
         assert_eq!(said, verdict == Verdict::Unexplained, "{share}");
+        assert_eq!(d.unconfirmed(), [], "{share}");
     }
     // A sensor's own white noise is not physics, however coarse the sensor.
     let d = ask(&recorded(loops, 22, |random, _| 0.01 * largest * random.normal(), |_, _, _| 0.0));

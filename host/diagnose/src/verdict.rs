@@ -140,6 +140,19 @@ pub struct Unexplained {
     pub share: f64,
     /// Its pattern.
     pub pattern: Pattern,
+    /// Effects that would remove much of the whole error, the one that removes the most first; see [`Diagnosis::unconfirmed`].
+    pub unconfirmed: Vec<Unconfirmed>,
+}
+
+/// An effect that would remove much of an error, but no more than chance or slow noise could.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unconfirmed {
+    /// Its name in the catalogue.
+    pub effect: String,
+    /// Share of the squared error that it would remove.
+    pub share: f64,
+    /// The numbers with which it would, in the law's order, SI.
+    pub parameters: Vec<f64>,
 }
 
 /// The improvement on held-out rows.
@@ -301,6 +314,13 @@ impl Diagnosis {
     pub fn explained_beside_small_rest(&self) -> Option<f64> {
         let explained = 1.0 - self.unexplained.share;
         (explained < EXPLAINED).then_some(explained)
+    }
+
+    /// Effects that would remove much of the error, where nothing is named.
+    #[must_use]
+    pub fn unconfirmed(&self) -> &[Unconfirmed] {
+        let open = self.missing.is_empty() && self.verdict() == Verdict::Unexplained;
+        if open { &self.unexplained.unconfirmed } else { &[] }
     }
 
     /// Whether there was anything to judge.

@@ -182,7 +182,8 @@ impl Arguments {
         options: &Options,
     ) -> Option<Result<refitted_table::Refitted>> {
         let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty() && !is_from_history(m));
-        (self.output.is_some() || confusable).then(|| {
+        let open = confusable || answer.unconfirmed().len() > 1;
+        (self.output.is_some() || open).then(|| {
             options.progress.stage("fitting the table with the named effects", 0);
             refitted_table::refit(campaign, muscle, answer)
         })

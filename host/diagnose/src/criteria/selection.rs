@@ -32,6 +32,8 @@ pam_data::criteria! {
     LARGEST_PEAK: f64 = 0.25, "F_cancel/F_b", "1", Judgement;
     /// An effect must explain this share of the excess error that it finds.
     LEAST_SHARE: f64 = 0.4, "q_first", "1", Judgement;
+    /// Where nothing is named, effects are listed that would remove this share of the squared error.
+    UNCONFIRMED_SHARE: f64 = 0.5, "q_open", "1", Convention("half");
     /// A further effect must also explain this share of all excess error: more than the first law leaves by its inexactness.
     FURTHER_SHARE: f64 = 0.03, "q_further", "1", Derived("17 % of the error; laws are off by 3 to 7 % of their traces");
     /// Effects with which pairs are tried where no effect explains enough alone.

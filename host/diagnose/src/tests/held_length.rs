@@ -116,3 +116,20 @@ fn the_zero_of_the_load_cell_is_read_of_a_slack_muscle() {
         assert!(d.held_out.rms_after_N < 0.75 * d.held_out.rms_before_N, "{:?}", d.held_out);
     }
 }
+
+/// A length that slips all the time: nothing separates it from slow noise.
+#[test]
+fn an_effect_that_slow_noise_imitates_is_listed_and_not_named() {
+    let mut campaign = recorded_with_strands(30e3, 0.0, 5);
+    let end = campaign.recordings.last().and_then(|r| r.time.last()).copied().unwrap_or(1.0);
+    for r in &mut campaign.recordings {
+        for (f, t) in r.force.iter_mut().flatten().zip(&r.time) {
+            *f -= 0.04 * *f * t / end;
+        }
+    }
+    let d = ask(&campaign);
+    assert_eq!((d.verdict(), names(&d)), (Verdict::Unexplained, vec![]), "{:?}", d.unexplained);
+    let unconfirmed = d.unconfirmed();
+    assert!(unconfirmed.iter().any(|u| u.effect == "end-slip"), "{unconfirmed:?}");
+    assert!(unconfirmed.iter().all(|u| u.share >= 0.5) && unconfirmed.len() <= 4, "{unconfirmed:?}");
+}

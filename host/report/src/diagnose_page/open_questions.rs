@@ -18,6 +18,9 @@ pub(super) fn remains(d: &Diagnosis) -> Section {
             }
         ));
     }
+    if let Some(unconfirmed) = wording::unconfirmed(d) {
+        section.text(format!("{unconfirmed}."));
+    }
     if !d.judged() {
         return section;
     }

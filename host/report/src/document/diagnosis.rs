@@ -5,7 +5,7 @@
 
 use pam_diagnose::verdict::{
     Considered, Diagnosis, HeldOut, Missing, NextExperiment, ParameterValue, PathStep, Profile, Region,
-    Trace, Verdict,
+    Trace, Unconfirmed, Verdict,
 };
 use serde::Serialize;
 
@@ -86,9 +86,22 @@ struct MissingDocument<'a> {
 /// What no named effect explains.
 #[derive(Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-struct UnexplainedDocument {
+struct UnexplainedDocument<'a> {
     share: f64,
     pattern: String,
+    /// Effects that would remove much of it, where nothing is named. They are no findings: chance or slow noise could do the same.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(test, schemars(default))]
+    unconfirmed: Vec<UnconfirmedDocument<'a>>,
+}
+
+/// An effect that would remove much of the error.
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
+struct UnconfirmedDocument<'a> {
+    effect: &'a str,
+    /// Share of the squared error that it would remove.
+    share: f64,
 }
 
 /// Root mean square errors on held-out rows, N.
@@ -176,7 +189,7 @@ pub struct DiagnosisDocument<'a> {
     misfit_rms_N: f64,
     r#where: Vec<RegionDocument<'a>>,
     missing: Vec<MissingDocument<'a>>,
-    unexplained: UnexplainedDocument,
+    unexplained: UnexplainedDocument<'a>,
     held_out: HeldOutDocument,
     next_experiment: Option<NextExperimentDocument<'a>>,
     considered: Vec<ConsideredDocument<'a>>,
@@ -221,6 +234,7 @@ impl<'a> DiagnosisDocument<'a> {
             unexplained: UnexplainedDocument {
                 share: d.unexplained.share,
                 pattern: wording::pattern(&d.unexplained.pattern),
+                unconfirmed: d.unconfirmed().iter().map(unconfirmed).collect(),
             },
             held_out: held_out(&d.held_out),
             next_experiment: d.next_experiment.as_ref().map(next_experiment),
@@ -297,6 +311,10 @@ fn considered(c: &Considered) -> ConsideredDocument<'_> {
         checked: c.checked,
         visible: c.visible,
     }
+}
+
+fn unconfirmed(u: &Unconfirmed) -> UnconfirmedDocument<'_> {
+    UnconfirmedDocument { effect: &u.effect, share: u.share }
 }
 
 fn path_step(s: &PathStep) -> PathStepDocument<'_> {

@@ -1,7 +1,7 @@
 //! The judgement, the residual, and how rows were held out.
 
 use pam_diagnose::remark::Remark;
-use pam_diagnose::verdict::{Diagnosis, Pattern, Split, Verdict};
+use pam_diagnose::verdict::{Diagnosis, Pattern, Split, Unconfirmed, Verdict};
 
 use super::{list, region, remark};
 
@@ -39,6 +39,9 @@ pub fn verdict(d: &Diagnosis) -> String {
         Verdict::PartlyExplained => {
             format!("The model lacks {}. This explains a part of its error above the noise.", list(&names))
         }
+        Verdict::Unexplained if !d.unconfirmed().is_empty() => {
+            "The model lacks something. Effects of the library fit its error, but no better than chance or slow noise could.".to_owned()
+        }
         Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) => {
             noise(&d.unexplained.pattern)
         }
@@ -71,6 +74,19 @@ fn noise(pattern: &Pattern) -> String {
         ),
         _ => String::new(),
     }
+}
+
+/// The effects that would remove much of an error for which nothing is named.
+#[must_use]
+pub(crate) fn unconfirmed(d: &Diagnosis) -> Option<String> {
+    let effect = |u: &Unconfirmed| format!("{} ({:.0} %)", u.effect, 100.0 * u.share);
+    let all: Vec<String> = d.unconfirmed().iter().map(effect).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "Not confirmed, because chance or slow noise could do the same, but they would remove at least half of the squared error: {}",
+            all.join(", ")
+        )
+    })
 }
 
 /// The pattern of what no named effect explains; `none` where there is none.

@@ -8,8 +8,8 @@ use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict
 use pam_diagnose::why::Why;
 
 use super::{
-    HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split, why,
-    with_interval,
+    HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split,
+    unconfirmed, why, with_interval,
 };
 use crate::effect_page::place;
 
@@ -61,6 +61,9 @@ pub fn summary(d: &Diagnosis) -> String {
             100.0 * d.unexplained.share,
             unexplained_base(d)
         );
+        if let Some(unconfirmed) = unconfirmed(d) {
+            let _ = writeln!(s, "  {unconfirmed}");
+        }
     }
     if let Some(n) = &d.next_experiment {
         let _ = writeln!(
@@ -122,6 +125,8 @@ fn header(s: &mut String, d: &Diagnosis) {
             Verdict::Explained => &explained,
             Verdict::PartlyExplained =>
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
+            Verdict::Unexplained if !d.unconfirmed().is_empty() =>
+                "UNEXPLAINED: effects of the library fit the model's error above the noise, but no better than chance or slow noise could.",
             Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) =>
                 "NOISE WITH MEMORY: the error does not repeat under the same conditions, and no effect of the library fits it.",
             Verdict::Unexplained if !d.missing.is_empty() =>
