@@ -6,6 +6,7 @@
 //! | file | what |
 //! | --- | --- |
 //! | `campaign` | mountings, runs and their clock |
+//! | `base_friction` | the friction of the base model, taken out first |
 //! | `staircase` | pulses, settled points, direction |
 //! | `memory` | the relaxing states, stepped exactly |
 //! | `spline`, `shift_fit` | free curves on a shifted pressure |
@@ -29,6 +30,7 @@
 pub mod answer;
 
 mod additional_effect;
+mod base_friction;
 mod campaign;
 mod entries;
 mod findings;
@@ -125,9 +127,19 @@ pub fn history(campaign: &Campaign, geometry: &Geometry) -> Option<History> {
 
 pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
     let rest_length = geometry.rest_length.metres();
-    let points = campaign::points(campaign, rest_length)?;
-    let fits = fits(&points, geometry);
-    let answer = judge::answer(&points, &fits, campaign, rest_length);
+    let read = campaign::points(campaign, rest_length)?;
+    let first = fits(&read, geometry);
+    let moved = base_friction::removed(&read, &first, geometry);
+    let friction = moved.as_ref().map(|(_, coefficient)| *coefficient);
+    // No other effect was needed in its place; a slack muscle has no friction.
+    let (points, fits) = match &moved {
+        Some((points, _)) => {
+            let slack_reading = first.slack_reading.clone();
+            (points, Fits { needed: None, slack_reading, ..fits(points, geometry) })
+        }
+        None => (&read, first),
+    };
+    let answer = History { friction, ..judge::answer(&read, &fits, campaign, rest_length) };
     let (law, _) = fits.best();
     let peak = (0..points.len())
         .map(|i| (law.columns[0][i] * law.fit.theta[0] * fits.layer.slope(law, i)).abs())
@@ -143,7 +155,7 @@ pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
             (own.clone().map(|i| points.time[i] + run.zero).collect(), own.map(moved).collect())
         })
         .collect();
-    let regions = places::regions(&points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
+    let regions = places::regions(points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
     let slack_reading = fits.slack_reading.clone();
     Some(Found { answer, regions, shifts, peak, needed: fits.needed.clone(), slack_reading })
 }

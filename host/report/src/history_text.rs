@@ -50,6 +50,12 @@ pub fn text(history: &History) -> String {
         u.with_memory.rms_pct,
         u.with_slips.map_or(String::new(), |e| format!(", {:.2} % beside the slips", e.rms_pct))
     );
+    if let Some(friction) = history.friction {
+        let _ = writeln!(
+            s,
+            "  friction of the base model, k_F = {friction:.3}, is removed first: unseen runs are predicted better with it"
+        );
+    }
     if u.supported_with.points < u.with_memory.points {
         let _ = writeln!(
             s,

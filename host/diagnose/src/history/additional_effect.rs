@@ -92,12 +92,12 @@ pub(super) fn no_worse(one: &[f64], other: &[f64]) -> bool {
 }
 
 impl Tried {
-    fn sum(&self) -> f64 {
+    pub(super) fn sum(&self) -> f64 {
         self.squares.iter().sum()
     }
 
     /// The coefficient of the last column, and its standard error.
-    fn amplitude(&self) -> (f64, f64) {
+    pub(super) fn amplitude(&self) -> (f64, f64) {
         let last = |l: &Law| l.fit.theta.last().copied().unwrap_or(0.0);
         (last(&self.law), jackknife::deviation(&self.unseen.folds.iter().map(last).collect::<Vec<_>>()))
     }

@@ -345,6 +345,8 @@ pub struct History {
     pub averaged: bool,
     /// The largest force, N: the scale of errors in percent.
     pub largest_force_N: f64,
+    /// Coefficient `k_F` of the base model's friction, taken out before the memory was fitted; absent where unseen runs do not need it.
+    pub friction: Option<f64>,
     /// Every mounting, in the order of the recordings.
     pub mountings: Vec<Mounting>,
     /// The law.

@@ -40,6 +40,7 @@ pub(super) fn answer(points: &Points, fits: &Fits<'_>, campaign: &Campaign, rest
         points: points.len(),
         averaged: points.averaged,
         largest_force_N: points.largest_force(),
+        friction: None,
         mountings: mountings(points, fits, law, rest_length),
         law: memory_law(points, fits, law, unseen, quantile),
         unseen: unseen_runs,

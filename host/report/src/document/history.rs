@@ -26,6 +26,8 @@ pub(super) struct HistoryDocument<'a> {
     averaged: bool,
     /// The largest force: the scale of errors in percent.
     largest_force_N: f64,
+    /// Coefficient of the base model's friction, taken out before the memory was fitted; null where unseen runs do not need it.
+    friction: Option<f64>,
     mountings: Vec<MountingDocument>,
     law: LawDocument<'a>,
     unseen: UnseenDocument,
@@ -210,6 +212,7 @@ impl<'a> HistoryDocument<'a> {
             points: h.points,
             averaged: h.averaged,
             largest_force_N: h.largest_force_N,
+            friction: h.friction,
             mountings: h.mountings.iter().map(mounting).collect(),
             law: law(&h.law),
             unseen: unseen(&h.unseen),

@@ -14,6 +14,8 @@ use pam_fit::bench::{BenchName, Candidate};
 struct Bench {
     /// Friction of constant size, N, that turns over a change of pressure of 10 kPa.
     friction: f64,
+    /// The base model's friction as a share of the pull, which turns likewise.
+    coefficient: f64,
     /// Time constant of a filter in the force channel, s.
     filter: f64,
     /// Time constant of the pressure sensor, s.
@@ -72,7 +74,8 @@ fn run(
         let moved = p + 0.6 * states.iter().sum::<f64>() / 5.0;
         let knee = 1.0 + bench.softer;
         let free = knee * pull(threshold + (moved - threshold) / knee, threshold);
-        let force = free - direction * bench.friction.min(free) + bench.zero + bench.per_pressure * p;
+        let friction = bench.friction.min(free) + bench.coefficient * free;
+        let force = free - direction * friction + bench.zero + bench.per_pressure * p;
         let before = filtered.unwrap_or(force);
         let late: f64 = before + (force - before) * (1.0 - (-STEP / bench.filter.max(1e-6)).exp());
         filtered = Some(late);
@@ -121,6 +124,19 @@ fn nothing_is_named_beside_a_memory_alone() {
         assert!(found.answer.named, "seed {seed}: {:?}", found.answer.why_not);
         assert!(found.needed.is_none(), "seed {seed}: {:?}", found.needed);
         assert!(!found.slack_reading.as_ref().expect("slack mountings").found, "seed {seed}");
+    }
+}
+
+#[test]
+fn the_friction_of_the_base_model_does_not_hide_a_memory() {
+    for (coefficient, seed) in [(0.0, 501), (0.04, 502), (0.08, 503)] {
+        let found = diagnosed(Bench { coefficient, ..Bench::default() }, seed);
+        assert!(found.answer.named, "{coefficient}: {:?}", found.answer.why_not);
+        assert!(found.needed.is_none(), "{coefficient}: {:?}", found.needed);
+        let fitted = found.answer.friction.unwrap_or(0.0);
+        assert!((fitted - coefficient).abs() < 0.25 * coefficient + 1e-3, "{coefficient}: {fitted}");
+        let share = found.answer.law.relaxed_share.value;
+        assert!((share / 0.6 - 1.0).abs() < 0.2, "{coefficient}: {share}");
     }
 }
 
