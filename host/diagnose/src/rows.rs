@@ -18,6 +18,7 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
+use super::criteria::noise::SAME_LENGTH;
 use super::criteria::rows::{ONE_SPEED, PRESSURE_TRIM, SPEED_TRIM, SPIKES_MENTIONED};
 use super::remark::Remark;
 use pam_data::error::Result;
@@ -25,7 +26,7 @@ use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, resolution};
-use pam_data::statistics::quantile;
+use pam_data::statistics::{extremes, quantile};
 use pam_fit::Clip;
 use pam_fit::beginning::Beginning;
 
@@ -268,6 +269,11 @@ impl Rows {
 }
 
 impl Rows {
+    /// Whether the length was held throughout, and was the same in all recordings.
+    pub(crate) fn have_one_held_length(&self) -> bool {
+        let (least, most) = extremes(self.contexts().iter().map(|c| c.contraction));
+        self.isometric && most - least < SAME_LENGTH
+    }
     /// Whether the muscle moved at one speed throughout, so that a law of speed is a constant.
     pub(crate) fn have_one_speed(&self) -> bool {
         let moving =
@@ -307,7 +313,8 @@ pub(crate) fn prepare_corrected(
     let level = levels.of_rows(&gathered.contexts);
     let block = blocks::merge(&gathered, &vented);
     let cycle = blocks::cycles(&gathered, &level);
-    let root_weight = readings::blurred(&gathered.force, root_weight, &block, &gathered.recording);
+    let whole = if isometric { &gathered.recording } else { &block };
+    let root_weight = readings::blurred(&gathered.force, root_weight, whole, &gathered.recording);
     let blocks = block.last().map_or(0, |last| *last as usize + 1);
     let n = gathered.force.len();
     let recorded = Recorded {

@@ -17,6 +17,7 @@ use super::noise::{Noise, family_p};
 use super::remark::Remark;
 use super::renewed_laws;
 use super::rows::Rows;
+use model_core::effects::Imitates;
 
 /// A selected effect, with its weight among its competitors at that step.
 #[derive(Clone, Debug)]
@@ -196,6 +197,11 @@ pub(super) fn is_selectable(
     rows: &Rows,
     scorer: &Scorer<'_>,
 ) -> bool {
+    // At one held length a force over pressure is all there is: a wrong description of the muscle makes the same one.
+    let imitates = library[t.candidate].traits.imitates;
+    if imitates == Some(Imitates::Description) && rows.have_one_held_length() {
+        return false;
+    }
     let Scale { weight, blocked, .. } = scorer.scale;
     let moved = (t.gain.max(t.relief) / weight).sqrt();
     let table = t.beyond_tables < TWIN_OF_TABLES;

@@ -37,14 +37,15 @@ pub(super) fn ends(campaign: &Campaign) -> Vec<Clip> {
 }
 
 /// Weights, reduced where the force runs from one branch to the other within a few rows: there the time skew between force and stroke
-/// dominates the error.
-pub(super) fn blurred(force: &[f64], mut weights: Vec<f64>, block: &[u32], recording: &[u32]) -> Vec<f64> {
+/// dominates the error. `whole` holds the pieces in which the usual change from row to row is counted: half-strokes, or recordings where the
+/// length is held, since a vent is a piece of its own there.
+pub(super) fn blurred(force: &[f64], mut weights: Vec<f64>, whole: &[u32], recording: &[u32]) -> Vec<f64> {
     let strongest = force.iter().copied().fold(0.0, f64::max);
     let step = |i: usize| (force[i + 1] - force[i]).abs();
     let n = force.len();
     let mut from = 0;
     for i in 1..=n {
-        if i < n && block[i] == block[from] && recording[i] == recording[from] {
+        if i < n && whole[i] == whole[from] && recording[i] == recording[from] {
             continue;
         }
         let mut steps: Vec<f64> = (from..i - 1).map(step).collect();
