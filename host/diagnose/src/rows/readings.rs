@@ -63,6 +63,18 @@ pub(super) fn blurred(force: &[f64], mut weights: Vec<f64>, whole: &[u32], recor
 mod tests {
     use super::*;
 
+    /// A vent of half a second between two holds: a half-stroke of its own has no slower rows to compare it with.
+    #[test]
+    fn readings_of_a_vent_count_less_where_the_length_is_held() {
+        let force: Vec<f64> =
+            (0..200).map(|i| (1000.0 - 100.0 * (i as f64 - 100.0).clamp(0.0, 10.0)).max(0.0)).collect();
+        let recording = vec![0; 200];
+        let half_strokes: Vec<u32> = (0..200).map(|i| u32::from(i > 100) + u32::from(i > 110)).collect();
+        let of_vent = |whole: &[u32]| blurred(&force, vec![1.0; 200], whole, &recording)[105];
+        assert!(of_vent(&recording) < 0.1, "{}", of_vent(&recording));
+        assert!(of_vent(&half_strokes) > 0.9, "{}", of_vent(&half_strokes));
+    }
+
     /// The force of a fast stroke, which friction turns with, and the same with three spikes.
     #[test]
     fn the_extremum_of_a_fast_stroke_is_no_spike() {

@@ -73,6 +73,18 @@ fn beside_such_friction_a_slow_gauge_is_found() {
     );
 }
 
+/// A load cell that is not linear bends the force over pressure, and so does a bladder that is not described right.
+#[test]
+fn at_one_held_length_no_error_of_a_scale_is_named() {
+    let mut campaign = recorded_with_strands(30e3, 0.0, 6);
+    for f in campaign.recordings.iter_mut().filter_map(|r| r.force.as_mut()).flatten() {
+        *f *= 1.0 - 5e-4 * *f;
+    }
+    let d = ask(&campaign);
+    let of_scale = ["force-gain", "gauge-gain", "braid-elasticity", "tip-effect", "displacement-offset"];
+    assert!(names(&d).iter().all(|n| !of_scale.contains(n)), "{:?}", names(&d));
+}
+
 /// One recording of ramps at each of three lengths; the muscle is slack at low pressures where it is shortened. The load cell reads `zero`
 /// (N) too much.
 fn at_three_lengths(zero: f64, seed: u64) -> Campaign {

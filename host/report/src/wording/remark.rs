@@ -70,7 +70,7 @@ pub fn remark(remark: &Remark) -> String {
         }
         Remark::Concealed { rms, share, candidates } => concealed(*rms, *share, candidates),
         Remark::NotRepeatable(s) => format!(
-            "{}. This is more than sensor noise, and no effect of the library explains it. Check the air supply, the stroke sensor and \
+            "{}. This is more than sensor noise, and no effect is confirmed as its cause. Check the air supply, the stroke sensor and \
              all fixings, then repeat two strokes under the same conditions",
             scatter(s)
         ),
