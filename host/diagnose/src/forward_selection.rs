@@ -503,7 +503,7 @@ mod tests {
     use super::*;
     use crate::candidates::library;
     use crate::rows::{prepare, typical_step};
-    use crate::tests::{coloured, geometry, loops, recorded};
+    use crate::tests::{coloured, geometry, held_length, loops, recorded};
 
     #[test]
     fn a_refused_candidate_leaves_the_effects_before_it_as_they_were() {
@@ -530,6 +530,29 @@ mod tests {
         search.take(vec![weak]);
         assert!(search.excluded.contains(&refused));
         assert_eq!(fitted(&search), before);
+    }
+
+    #[test]
+    fn at_one_held_length_no_effect_that_a_wrong_description_imitates_is_selectable() {
+        let campaigns = [
+            (held_length::recorded_with_strands(30e3, 0.0, 6), false),
+            (held_length::at_three_lengths(0.0, 6), true),
+        ];
+        for (campaign, selectable) in campaigns {
+            let braid = geometry().build().expect("a braid");
+            let (rows, _) = prepare(&campaign, &braid).expect("rows");
+            let library = library(&rows, &[]);
+            let blocked = rows.force.iter().copied().fold(0.0, f64::max);
+            let search = ForwardSelection::begin(&rows, &library, blocked, typical_step(&rows), &[]);
+            let scorer = Scorer::new(&search.joint, search.scale);
+            let (best, _) = scan_step(&library, &search.rows, &scorer, blocked, &[]);
+            for name in ["force-gain", "gauge-gain"] {
+                let fit = best.iter().find(|t| library[t.candidate].name() == name).expect("a fit");
+                let beyond = CandidateFit { beyond_tables: 1.0, ..fit.clone() };
+                let is = is_selectable(&beyond, &library, &search.rows, &scorer);
+                assert_eq!(is, selectable, "{name}");
+            }
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 pub(crate) mod added;
 mod beginnings;
 mod filtered;
-mod held_length;
+pub(crate) mod held_length;
 mod plays;
 mod ramps;
 mod together;
