@@ -12,6 +12,25 @@ use super::verdict::{Diagnosis, Outcome, Verdict};
 use pam_data::error::Result;
 use pam_data::recording::Campaign;
 
+/// The rows of recordings at which the muscle is not slack; of corrected ones, with the readings as they were.
+///
+/// # Errors
+/// A recording without force.
+pub(crate) fn under_load(
+    campaign: &Campaign,
+    as_read: Option<&Campaign>,
+    braid: &Braid<f64>,
+) -> Result<Rows> {
+    let (rows, _) = rows::prepare_corrected(campaign, as_read, braid)?;
+    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
+    Ok(baselines::without_slack(&rows, &fitted).0)
+}
+
+/// The error of the model as it was, rms, N.
+pub(crate) fn misfit(rows: &Rows) -> f64 {
+    baselines::fit(rows, Kind::Flexible(TABLE_ORDER), &[]).rms(rows)
+}
+
 /// Recordings with one bladder for all pressures: as they were read, or corrected.
 pub(crate) struct AsRead {
     rows: Rows,
@@ -32,9 +51,7 @@ impl AsRead {
     /// # Errors
     /// A recording without force.
     pub(crate) fn of(campaign: &Campaign, as_read: Option<&Campaign>, braid: &Braid<f64>) -> Result<Self> {
-        let (rows, _) = rows::prepare_corrected(campaign, as_read, braid)?;
-        let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-        let (rows, _) = baselines::without_slack(&rows, &fitted);
+        let rows = under_load(campaign, as_read, braid)?;
         let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
         Ok(Self { rows, fitted })
     }
@@ -56,7 +73,7 @@ impl AsRead {
             m.share_explained *= 1.0 - share;
         }
         diagnosis.unexplained.share *= 1.0 - share;
-        diagnosis.misfit_rms_N = baselines::fit(rows, Kind::Flexible(TABLE_ORDER), &[]).rms(rows);
+        diagnosis.misfit_rms_N = misfit(rows);
         let unseen = HeldOutRows::new(rows, kind, &[]).held_out(&[], diagnosis.noise_N);
         // Selected effects may need another split, whose errors are not comparable with this one's.
         if unseen.split == diagnosis.held_out.split {

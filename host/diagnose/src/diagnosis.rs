@@ -20,7 +20,7 @@ use super::filtered_channels;
 use super::findings::{considered, missing, unconfirmed};
 use super::known_effects;
 use super::linear::energy;
-use super::location::{self, block_ranges, locate};
+use super::location::{Location, block_ranges, locate};
 use super::noise::Noise;
 use super::options::Options;
 use super::preconditions::{blocked_force, limitations, not_judged, unmet_precondition};
@@ -289,7 +289,7 @@ impl Located {
         let (rows, sigma) = (&selection.rows, selection.noise.sigma);
         let line = spectrum::line(rows, &selection.joint.residual, &block_ranges(rows), step, 9)
             .filter(|l| l.p <= LINE_ALPHA && l.share >= LINE_SHARE);
-        let location::Located { mut regions, profiles, .. } =
+        let Location { mut regions, profiles, .. } =
             locate(rows, &selection.base_alone.residual, &selection.joint.residual, sigma, 7);
         let left = locate(rows, &selection.joint.residual, &selection.joint.residual, sigma, 8);
         // Noise that lasts is larger in one place than in another by chance.

@@ -128,14 +128,14 @@ pub fn history(campaign: &Campaign, geometry: &Geometry) -> Option<History> {
 pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
     let rest_length = geometry.rest_length.metres();
     let read = campaign::points(campaign, rest_length)?;
-    let first = fits(&read, geometry);
-    let moved = base_friction::removed(&read, &first, geometry);
+    let first = fits(&read, geometry, true);
+    let moved = base_friction::removed(&first, geometry);
     let friction = moved.as_ref().map(|(_, coefficient)| *coefficient);
     // No other effect was needed in its place; a slack muscle has no friction.
     let (points, fits) = match &moved {
         Some((points, _)) => {
             let slack_reading = first.slack_reading.clone();
-            (points, Fits { needed: None, slack_reading, ..fits(points, geometry) })
+            (points, Fits { slack_reading, ..fits(points, geometry, false) })
         }
         None => (&read, first),
     };
@@ -174,7 +174,8 @@ fn slack_reading(campaign: &Campaign, geometry: &Geometry) -> Option<SlackReadin
     slack_reading::of(&points, &law::thresholds(&freed))
 }
 
-fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
+/// All fits; those that find an effect beside the memory where one may be needed.
+fn fits<'a>(points: &'a Points, geometry: &Geometry, may_need_effect: bool) -> Fits<'a> {
     let layer = Layer::new(points, &TIMES);
     let everything = vec![true; points.len()];
     let law = layer.fit(&everything, None, &[], None);
@@ -200,10 +201,14 @@ fn fits<'a>(points: &'a Points, geometry: &Geometry) -> Fits<'a> {
     let mut directions = friction::directions(&layer, &areas, geometry);
     let drive = directions.first();
     let instead = drive.map(|d| friction::instead(&layer, (reported, seen), &steps, d)).unwrap_or_default();
-    let laws = directions.iter_mut().flat_map(|d| std::mem::take(&mut d.laws));
-    let columns: Vec<Column> = laws.chain(sensor_dynamics::columns(points)).collect();
-    let base: Vec<Vec<f64>> = directions.into_iter().map(|d| d.base).collect();
-    let needed = additional_effect::needed(&layer, (reported, seen), &steps, &base, &columns, &areas);
+    let needed = if may_need_effect {
+        let laws = directions.iter_mut().flat_map(|d| std::mem::take(&mut d.laws));
+        let columns: Vec<Column> = laws.chain(sensor_dynamics::columns(points)).collect();
+        let base: Vec<Vec<f64>> = directions.into_iter().map(|d| d.base).collect();
+        additional_effect::needed(&layer, (reported, seen), &steps, &base, &columns, &areas)
+    } else {
+        None
+    };
     let single = single_time(points, &law, &memory);
     Fits {
         by_direction: unseen::static_curves(points, true),

@@ -137,7 +137,7 @@ fn smoothed(rows: &Rows, residual: &[f64], half: usize) -> Vec<f64> {
 }
 
 /// Where the error is along every coordinate.
-pub(crate) struct Located {
+pub(crate) struct Location {
     /// Significant regions, strongest first.
     pub regions: Vec<Region>,
     /// For pictures.
@@ -147,7 +147,7 @@ pub(crate) struct Located {
 }
 
 /// Locates the error; `before` and `after` are weighted residuals without and with the named effects.
-pub(crate) fn locate(rows: &Rows, before: &[f64], after: &[f64], sigma: f64, seed: u64) -> Located {
+pub(crate) fn locate(rows: &Rows, before: &[f64], after: &[f64], sigma: f64, seed: u64) -> Location {
     let smooth = smoothed(rows, before, REGION_SMOOTHING);
     let mut excess: Vec<f64> = smooth.iter().map(|s| s * s).collect();
     // Noise that the smoothing leaves; independent rows would leave a fifth.
@@ -178,7 +178,7 @@ pub(crate) fn locate(rows: &Rows, before: &[f64], after: &[f64], sigma: f64, see
     regions.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     regions.retain(|r| r.p <= REGION_ALPHA);
     regions.truncate(MOST_REGIONS);
-    Located { regions, profiles, p }
+    Location { regions, profiles, p }
 }
 
 /// A region that stands out, beside what shuffled blocks make along the same coordinate.
@@ -191,12 +191,13 @@ struct Standing {
 }
 
 impl Standing {
-    /// A strength in standard deviations of the shuffles.
-    fn standardised(&self, strength: f64) -> f64 {
+    /// The strength, then that of each shuffle, in standard deviations of the shuffles.
+    fn standardised(&self) -> Vec<f64> {
         let n = self.shuffled.len() as f64;
         let mean = self.shuffled.iter().sum::<f64>() / n;
         let variance = self.shuffled.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / n;
-        (strength - mean) / variance.sqrt().max(f64::MIN_POSITIVE)
+        let all = std::iter::once(&self.strength).chain(&self.shuffled);
+        all.map(|s| (s - mean) / variance.sqrt().max(f64::MIN_POSITIVE)).collect()
     }
 }
 
@@ -204,12 +205,10 @@ impl Standing {
 ///
 /// Westfall and Young, Resampling-Based Multiple Testing, 1993: the largest standardised statistic of the same shuffles.
 fn family_p(standing: &[Standing]) -> f64 {
-    let largest = |of: &dyn Fn(&Standing) -> f64| {
-        standing.iter().map(|s| s.standardised(of(s))).fold(f64::NEG_INFINITY, f64::max)
-    };
-    let observed = largest(&|s| s.strength);
-    let beyond =
-        (0..REGION_SHUFFLES).filter(|shuffle| largest(&|s| s.shuffled[*shuffle]) >= observed).count();
+    let standardised: Vec<Vec<f64>> = standing.iter().map(Standing::standardised).collect();
+    let largest = |k: usize| standardised.iter().map(|s| s[k]).fold(f64::NEG_INFINITY, f64::max);
+    let observed = largest(0);
+    let beyond = (1..=REGION_SHUFFLES).filter(|k| largest(*k) >= observed).count();
     (beyond as f64 + 1.0) / (REGION_SHUFFLES as f64 + 1.0)
 }
 
@@ -366,7 +365,7 @@ mod tests {
     use crate::tests::{coloured, geometry, loops, recorded};
 
     /// The located weighted residual: noise of 1 N with a memory of 6 s, and a bump of this size (N) in the middle of the contraction.
-    fn located(rows: &Rows, bump: f64, seed: u64) -> Located {
+    fn located(rows: &Rows, bump: f64, seed: u64) -> Location {
         let mut random = Random(seed);
         let mut state = [0.0; 2];
         let noise = coloured(1.0, 6.0);
@@ -384,7 +383,7 @@ mod tests {
         let campaign = recorded(loops(&[0.4]), 4, |_, _| 0.0, |_, _, _| 0.0);
         let (rows, _) = prepare(&campaign, &geometry().build().expect("a braid")).expect("rows");
         const SEEDS: u64 = 12;
-        let noise: Vec<Located> = (1..=SEEDS).map(|seed| located(&rows, 0.0, seed)).collect();
+        let noise: Vec<Location> = (1..=SEEDS).map(|seed| located(&rows, 0.0, seed)).collect();
         let along_one = noise.iter().filter(|l| !l.regions.is_empty()).count();
         let along_any = noise.iter().filter(|l| l.p <= REGION_ALPHA).count();
         assert!(along_one > 2 * along_any && along_any <= 3, "{along_one} {along_any} of {SEEDS}");

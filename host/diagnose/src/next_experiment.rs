@@ -34,6 +34,12 @@ fn trace(law: Candidate, shape: &[f64], amplitudes: &[f64], contexts: &[Context<
     sum
 }
 
+/// Whether an experiment could decide between effects that the recordings do not distinguish.
+#[must_use]
+pub fn is_open(diagnosis: &Diagnosis) -> bool {
+    OpenQuestion::of(diagnosis).is_some()
+}
+
 /// Effects of which the recordings do not say which it is.
 struct OpenQuestion {
     effect: String,

@@ -18,6 +18,7 @@ use model_core::effects::Context;
 pub(crate) use self::blocks::typical_step;
 use self::levels::Levels;
 pub(crate) use self::sleeve::{ORDERS, Shape, YEOH};
+pub(crate) use self::tares::vented_below;
 use super::criteria::noise::SAME_LENGTH;
 use super::criteria::rows::{ONE_SPEED, PRESSURE_TRIM, SPEED_TRIM, SPIKES_MENTIONED};
 use super::remark::Remark;
@@ -26,7 +27,7 @@ use pam_data::progress::SharedProgress;
 use pam_data::recording::dropouts::Screened;
 use pam_data::recording::motion::Motion;
 use pam_data::recording::{Campaign, resolution};
-use pam_data::statistics::{extremes, quantile};
+use pam_data::statistics::{quantile, range};
 use pam_fit::Clip;
 use pam_fit::beginning::Beginning;
 
@@ -271,8 +272,7 @@ impl Rows {
 impl Rows {
     /// Whether the length was held throughout, and was the same in all recordings.
     pub(crate) fn have_one_held_length(&self) -> bool {
-        let (least, most) = extremes(self.contexts().iter().map(|c| c.contraction));
-        self.isometric && most - least < SAME_LENGTH
+        self.isometric && range(self.contexts().iter().map(|c| c.contraction)) < SAME_LENGTH
     }
     /// Whether the muscle moved at one speed throughout, so that a law of speed is a constant.
     pub(crate) fn have_one_speed(&self) -> bool {

@@ -20,10 +20,11 @@ use pam_data::error::{DataCode, Error, Result};
 use pam_data::muscle_description::MuscleDescription;
 use pam_data::output::{FolderLock, to_standard_output, write_whole};
 use pam_data::progress::SharedProgress;
-use pam_diagnose::history::is_from_history;
 use pam_diagnose::remark::Remark;
 use pam_diagnose::{
-    Diagnosis, Options, diagnose_described, next_experiment::next_experiment, refitted_table,
+    Diagnosis, Options, diagnose_described,
+    next_experiment::{self, next_experiment},
+    refitted_table,
 };
 use pam_fit::checks::Checks;
 use pam_fit::predict::predict;
@@ -181,9 +182,7 @@ impl Arguments {
         answer: &Diagnosis,
         options: &Options,
     ) -> Option<Result<refitted_table::Refitted>> {
-        let confusable = answer.missing.iter().any(|m| !m.confusable_with.is_empty() && !is_from_history(m));
-        let open = confusable || answer.unconfirmed().len() > 1;
-        (self.output.is_some() || open).then(|| {
+        (self.output.is_some() || next_experiment::is_open(answer)).then(|| {
             options.progress.stage("fitting the table with the named effects", 0);
             refitted_table::refit(campaign, muscle, answer)
         })

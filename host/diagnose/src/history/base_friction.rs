@@ -14,11 +14,12 @@ use super::held_table::predicts_better;
 
 /// The points on the pressures that the muscle would need without the base model's friction, and the coefficient of this friction; `None`
 /// where unseen runs do not need it, or need another effect in its place.
-pub(super) fn removed(points: &Points, fits: &Fits<'_>, geometry: &Geometry) -> Option<(Points, f64)> {
+pub(super) fn removed(fits: &Fits<'_>, geometry: &Geometry) -> Option<(Points, f64)> {
     if fits.needed.is_some() {
         return None;
     }
     let Fits { layer, law, memory, .. } = fits;
+    let points = layer.points;
     let areas = friction::areas(layer, law);
     let with = friction::directions(layer, &areas, geometry).into_iter().map(|direction| {
         let tried = tried(layer, law, &[], &[&direction.base]);
@@ -27,7 +28,8 @@ pub(super) fn removed(points: &Points, fits: &Fits<'_>, geometry: &Geometry) -> 
     let (shifts, best) = with.min_by(|a, b| a.1.sum().total_cmp(&b.1.sum()))?;
     let coefficient = best.amplitude().0;
     let without = measured(points, law.clone(), memory.clone());
-    let pressure = points.pressure.iter().zip(&shifts).map(|(p, s)| p + coefficient * s).collect();
-    (coefficient > 0.0 && predicts_better(&best.squares, &without.squares))
-        .then(|| (Points { pressure, ..points.clone() }, coefficient))
+    (coefficient > 0.0 && predicts_better(&best.squares, &without.squares)).then(|| {
+        let moved = points.pressure.iter().zip(&shifts).map(|(p, s)| p + coefficient * s);
+        (Points { pressure: moved.collect(), ..points.clone() }, coefficient)
+    })
 }

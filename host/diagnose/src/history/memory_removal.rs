@@ -1,19 +1,19 @@
 //! The history beside the static search: the search runs on recordings from which the memory was subtracted.
 
-use model_core::braid::{Braid, Geometry};
+use std::borrow::Cow;
+
+use model_core::braid::Geometry;
 
 use super::additional_effect::AdditionalEffect;
 use super::criteria::{ENTER_EXPLAINED, ENTER_RESOLVED, MOST_LOST};
 use super::entries::is_from_history;
 use super::slack_reading::SlackReading;
 use super::{Found, entries, found, slack_reading};
-use crate::as_read::AsRead;
-use crate::baselines::{self, Kind};
+use crate::as_read::{self, AsRead};
 use crate::criteria::judgement::PARTLY_EXPLAINED;
 use crate::diagnosis::{diagnose as statically, with_baseline};
 use crate::options::Options;
 use crate::remark::Remark;
-use crate::rows;
 use crate::verdict::{Considered, Diagnosis, HeldOut, Missing, Outcome, Split, Verdict, WhyNot};
 use pam_data::error::{DataCode, Error, Result};
 use pam_data::recording::Campaign;
@@ -31,27 +31,29 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
     }
     let screened = Screened::of(campaign);
     let reliable = reliable(&screened);
-    let Some(found) = found(&reliable, geometry) else {
-        let reading = slack_reading(&reliable, geometry).filter(|_| options.given.is_empty());
-        return beside_slack_reading(campaign, geometry, options, reading.as_ref());
-    };
+    let found = found(&reliable, geometry);
     // What the user gives as known is fitted as it is, to the recordings as they are.
     if !options.given.is_empty() {
         let mut diagnosis = statically(campaign, geometry, options)?;
-        diagnosis.history = Some(found.answer);
+        diagnosis.history = found.map(|f| f.answer);
         return Ok(diagnosis);
     }
+    let Some(found) = found else {
+        let reading = slack_reading(&reliable, geometry);
+        return beside_slack_reading(campaign, geometry, options, reading.as_ref());
+    };
     let slack_reading = found.slack_reading.clone();
     let slack_reading = slack_reading.as_ref();
     if !found.answer.named {
-        let mut diagnosis = statically(&corrected(campaign.clone(), slack_reading), geometry, options)?;
+        let mut diagnosis =
+            statically(&corrected(Cow::Borrowed(campaign), slack_reading), geometry, options)?;
         enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
         enter_slack_reading(&mut diagnosis, slack_reading, 0.0);
         diagnosis.history = Some(found.answer);
         return Ok(diagnosis);
     }
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
-    let freed = corrected(without_memory(&reliable, &found), slack_reading);
+    let freed = corrected(Cow::Owned(without_memory(&reliable, &found)), slack_reading);
     let mut diagnosis = statically(&freed, geometry, options)?;
     enter(&mut diagnosis, found);
     enter_slack_reading(&mut diagnosis, slack_reading, 0.0);
@@ -60,7 +62,8 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
         diagnosis.remarks.push(Remark::Screening(failures));
     }
-    if let Some(misfit) = misfit(&reliable, &braid)? {
+    let misfit = as_read::misfit(&as_read::under_load(&reliable, None, &braid)?);
+    if misfit.is_finite() && misfit > 0.0 {
         diagnosis.misfit_rms_N = misfit;
     }
     Ok(diagnosis)
@@ -73,16 +76,10 @@ fn beside_slack_reading(
     options: &Options,
     reading: Option<&SlackReading>,
 ) -> Result<Diagnosis> {
-    if !reading.is_some_and(|r| r.found) {
-        // Most are not corrected: they are not copied.
-        let mut diagnosis = statically(campaign, geometry, options)?;
-        enter_slack_reading(&mut diagnosis, reading, 0.0);
-        return Ok(diagnosis);
-    }
-    let freed = corrected(campaign.clone(), reading);
+    let freed = corrected(Cow::Borrowed(campaign), reading);
     let (mut diagnosis, kind) = with_baseline(&freed, geometry, options)?;
     let mut explained = 0.0;
-    if diagnosis.judged() {
+    if reading.is_some_and(|r| r.found) && diagnosis.judged() {
         let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
         let (before, after) = (AsRead::of(campaign, None, &braid)?, AsRead::of(&freed, None, &braid)?);
         explained = before.enter(&mut diagnosis, kind, &after).share;
@@ -132,25 +129,16 @@ fn without_memory(campaign: &Campaign, found: &Found) -> Campaign {
     freed
 }
 
-/// The recordings without what the load cell reads of a slack muscle.
-fn corrected(mut campaign: Campaign, reading: Option<&SlackReading>) -> Campaign {
+/// The recordings without what the load cell reads of a slack muscle; as they are where that is nothing.
+fn corrected<'a>(mut campaign: Cow<'a, Campaign>, reading: Option<&SlackReading>) -> Cow<'a, Campaign> {
     let Some(reading) = reading.filter(|r| r.found) else { return campaign };
     let (zero, per_pressure) = (reading.zero(), reading.per_pressure());
-    for recording in &mut campaign.recordings {
+    for recording in &mut campaign.to_mut().recordings {
         for (force, pressure) in recording.force.iter_mut().flatten().zip(&recording.pressure) {
             *force -= zero + per_pressure * pressure;
         }
     }
     campaign
-}
-
-/// Misfit of the model as it was on the recordings as they are, N.
-fn misfit(campaign: &Campaign, braid: &Braid<f64>) -> Result<Option<f64>> {
-    let (rows, _) = rows::prepare(campaign, braid)?;
-    let fitted = baselines::fit(&rows, Kind::Stiff, &[]);
-    let (rows, _) = baselines::without_slack(&rows, &fitted);
-    let misfit = baselines::fit(&rows, Kind::Flexible(4), &[]).rms(&rows);
-    Ok((misfit.is_finite() && misfit > 0.0).then_some(misfit))
 }
 
 fn enter(diagnosis: &mut Diagnosis, found: Found) {

@@ -18,7 +18,7 @@ use super::criteria::{
 };
 use super::findings::Contrast;
 use super::shift_fit;
-use crate::criteria::rows::{VENTED_PRESSURE, VENTED_SHARE};
+use crate::rows::vented_below;
 
 /// Readings of a slack muscle.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,7 +124,7 @@ fn turns(points: &Points, almost: &dyn Fn(usize) -> Vec<usize>) -> f64 {
 /// What the cell reads of the vented muscle in each mounting, N. At full length a muscle is never slack under pressure; vented, it shows
 /// whether the zero is the same there, too: what a guide holds back after the length was changed is not.
 fn read_of_vented(points: &Points) -> Vec<f64> {
-    let limit = 1e-3 * VENTED_PRESSURE.min(1e3 * VENTED_SHARE * points.highest());
+    let limit = 1e-3 * vented_below(1e3 * points.highest());
     let vented = |m: usize, i: &usize| points.mounting[*i] == m && points.pressure[*i] < limit;
     let read = |m: usize| reading(points, (0..points.len()).filter(|i| vented(m, i)));
     (0..points.mountings.len()).filter_map(read).collect()

@@ -40,10 +40,15 @@ fn zeros_agree<'a>(tares: impl Iterator<Item = &'a [f64]>) -> bool {
     most - least <= SAME_ZERO * most.abs().max(least.abs()) + SAME_ZERO_NOISE * doubt
 }
 
+/// The pressure below which a muscle is vented that was worked up to a highest one, Pa.
+pub(crate) fn vented_below(highest: f64) -> f64 {
+    (VENTED_SHARE * highest).min(VENTED_PRESSURE)
+}
+
 /// The highest pressure, and the one below which a muscle is vented, Pa.
 fn limit(contexts: &[Context<f64>]) -> (f64, f64) {
     let highest = contexts.iter().map(|c| c.pressure).fold(0.0, f64::max);
-    (highest, (VENTED_SHARE * highest).min(VENTED_PRESSURE))
+    (highest, vented_below(highest))
 }
 
 /// Rows without pressure: the muscle cannot pull, so what is read comes from the bench.
