@@ -21,6 +21,7 @@
 //! | `hysteresis` | the gap between filling and emptying, and its cause |
 //! | `findings` | documented contrasts with intervals over runs or mountings |
 //! | `slack_reading` | what the load cell reads of a slack muscle |
+//! | `first_runs` | the search on the other runs, where the first of each mounting alone differs without a memory |
 //! | `places` | where the static error is concentrated: run within mounting, time since mounting, mounting |
 //! | `judge` | rules of the verdict |
 //! | [`answer`] | the findings as values and JSON |
@@ -34,6 +35,7 @@ mod base_friction;
 mod campaign;
 mod entries;
 mod findings;
+mod first_runs;
 mod friction;
 mod held_table;
 mod hysteresis;
@@ -56,6 +58,7 @@ mod unseen;
 
 pub use answer::History;
 pub use entries::is_from_history;
+pub(crate) use first_runs::without_first_runs;
 pub use memory_removal::diagnose;
 pub(crate) use memory_removal::reliable_recordings;
 
@@ -65,6 +68,8 @@ use pam_data::recording::Campaign;
 use self::additional_effect::{AdditionalEffect, Column};
 use self::campaign::Points;
 use self::criteria::{LEAST_POINTS, MEMORY_SINGLE_TIMES, TIMES};
+use self::findings::Visits;
+use self::first_runs::FirstRuns;
 use self::friction::Instead;
 use self::law::{Law, Layer};
 use self::run_offset::Event;
@@ -79,6 +84,8 @@ pub(super) struct Found {
     pub answer: History,
     /// Where the static error of held-out runs is concentrated.
     pub regions: Vec<Region>,
+    /// First runs that differ from those that follow.
+    first_runs: Option<FirstRuns>,
     /// By recording: times, s, and shifts of pressure, Pa.
     pub shifts: Vec<(Vec<f64>, Vec<f64>)>,
     /// The largest force that the memory makes, N.
@@ -156,8 +163,15 @@ pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
         })
         .collect();
     let regions = places::regions(points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
-    let slack_reading = fits.slack_reading.clone();
-    Some(Found { answer, regions, shifts, peak, needed: fits.needed.clone(), slack_reading })
+    Some(Found {
+        answer,
+        regions,
+        first_runs: FirstRuns::of(points, &Visits::new(points)),
+        shifts,
+        peak,
+        needed: fits.needed.clone(),
+        slack_reading: fits.slack_reading.clone(),
+    })
 }
 
 /// What the load cell reads of a slack muscle, in any campaign at held lengths; `None` with fewer than two mountings that are slack at some

@@ -36,11 +36,12 @@ pub struct Refitted {
 }
 
 /// Refits the table beside the named effects. They are kept only where the recordings are then predicted better, or about as well
-/// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case.
+/// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case. First runs that the diagnosis leaves out are left out.
 ///
 /// # Errors
 /// Recordings that cannot be fitted.
 pub fn refit(campaign: &Campaign, muscle: &MuscleDescription, diagnosis: &Diagnosis) -> Result<Refitted> {
+    let campaign = &*history::without_first_runs(campaign, diagnosis);
     let plain = fit(campaign, muscle, &FitOptions::default())?;
     let tool = || format!("host {}", env!("CARGO_PKG_VERSION"));
     let bare = plain.table_file(tool());

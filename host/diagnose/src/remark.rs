@@ -107,6 +107,15 @@ pub enum Refusal {
 pub enum Remark {
     /// Beside a memory of the muscle, the static model between mountings leaves this error, N rms, without a name.
     StaticMisfit(f64),
+    /// The first runs of the mountings differ from those that follow, and no effect explains it: they were left out of the search.
+    FirstRuns {
+        /// Their recordings.
+        left_out: Vec<String>,
+        /// Of how many runs.
+        of: usize,
+        /// Whether the model agrees with the other runs.
+        others_agree: bool,
+    },
     /// Friction opposes the first stroke of each recording from its beginning, where this effect builds up after each reversal.
     BeginsWithinStroke(String),
     /// Each recording begins with a muscle that was just filled, for the memory of this effect.

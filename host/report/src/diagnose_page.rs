@@ -154,6 +154,12 @@ fn recommendation(d: &Diagnosis) -> Section {
         steps.push(
             "Use the table of `host fit`: it describes these recordings within their noise.".to_owned(),
         );
+    } else if wording::only_first_runs_differ(d) {
+        steps.push(
+            "Use the table that `host diagnose -o` writes: it is fitted to the runs that follow the first of each mounting. Before you use \
+             the muscle at another length, fill it several times."
+                .to_owned(),
+        );
     } else if d.missing.is_empty() {
         steps.push(
             "Use the table of `host fit`, with the error above. See below where the model is wrong."

@@ -18,7 +18,7 @@ mod why_not;
 pub(crate) use experiment::measure;
 pub use experiment::proposal;
 pub(crate) use hidden::{HiddenEffect, hidden};
-pub(crate) use outcome::{one_bladder_misfits, split, unconfirmed};
+pub(crate) use outcome::{one_bladder_misfits, only_first_runs_differ, split, unconfirmed};
 pub use outcome::{pattern, verdict};
 pub(crate) use region::region;
 pub use remark::remark;

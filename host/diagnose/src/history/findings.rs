@@ -81,6 +81,11 @@ impl Visits {
         Self { forces }
     }
 
+    /// Mean over pressures of one run's force during filling less another's, N.
+    pub(super) fn filled(&self, run: usize, other: usize) -> f64 {
+        self.difference((run, 0), (other, 0))
+    }
+
     /// Mean over pressures of one run's force less another's.
     fn difference(&self, (run, way): (usize, usize), (other, other_way): (usize, usize)) -> f64 {
         let pairs = self.forces[run][way].iter().zip(&self.forces[other][other_way]);
@@ -112,9 +117,7 @@ pub(super) fn first_run_deficit(points: &Points, visits: &Visits) -> Option<Cont
 /// The same of later runs: what runs differ by without run-in, N.
 pub(super) fn later_differences(points: &Points, visits: &Visits) -> Vec<f64> {
     shortened(points)
-        .flat_map(|m| {
-            points.mountings[m].runs.windows(2).skip(1).map(|w| visits.difference((w[1], 0), (w[0], 0)))
-        })
+        .flat_map(|m| points.mountings[m].runs.windows(2).skip(1).map(|w| visits.filled(w[1], w[0])))
         .filter(|d| d.is_finite())
         .collect()
 }
@@ -222,7 +225,7 @@ pub(super) fn full_length_slope(points: &Points) -> Option<f64> {
 /// First differences by mounting, N; see [`first_run_deficit`].
 pub(super) fn first_differences(points: &Points, visits: &Visits) -> Vec<f64> {
     let of = |m: usize| match points.mountings[m].runs[..] {
-        [first, second, ..] => visits.difference((second, 0), (first, 0)),
+        [first, second, ..] => visits.filled(second, first),
         _ => f64::NAN,
     };
     shortened(points).map(of).filter(|d| d.is_finite()).collect()

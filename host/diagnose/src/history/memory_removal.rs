@@ -8,7 +8,7 @@ use super::additional_effect::AdditionalEffect;
 use super::criteria::{ENTER_EXPLAINED, ENTER_RESOLVED, MOST_LOST};
 use super::entries::is_from_history;
 use super::slack_reading::SlackReading;
-use super::{Found, entries, found, slack_reading};
+use super::{Found, entries, first_runs, found, slack_reading};
 use crate::as_read::{self, AsRead};
 use crate::criteria::judgement::PARTLY_EXPLAINED;
 use crate::diagnosis::{diagnose as statically, with_baseline};
@@ -42,31 +42,56 @@ pub fn diagnose(campaign: &Campaign, geometry: &Geometry, options: &Options) -> 
         let reading = slack_reading(&reliable, geometry);
         return beside_slack_reading(campaign, geometry, options, reading.as_ref());
     };
-    let slack_reading = found.slack_reading.clone();
-    let slack_reading = slack_reading.as_ref();
     if !found.answer.named {
-        let mut diagnosis =
-            statically(&corrected(Cow::Borrowed(campaign), slack_reading), geometry, options)?;
-        enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
-        enter_slack_reading(&mut diagnosis, slack_reading, 0.0);
-        diagnosis.history = Some(found.answer);
-        return Ok(diagnosis);
+        return without_named_memory((campaign, &screened, &reliable), geometry, options, found);
     }
     let braid = geometry.build().map_err(|e| Error::new(DataCode::MuscleInvalid, e.to_string()))?;
+    let slack_reading = found.slack_reading.clone();
+    let slack_reading = slack_reading.as_ref();
     let freed = corrected(Cow::Owned(without_memory(&reliable, &found)), slack_reading);
     let mut diagnosis = statically(&freed, geometry, options)?;
     enter(&mut diagnosis, found);
     enter_slack_reading(&mut diagnosis, slack_reading, 0.0);
-    // The failures were taken out before.
-    if let Some(failures) = screened.remark() {
-        diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
-        diagnosis.remarks.push(Remark::Screening(failures));
-    }
+    report_failures(&mut diagnosis, &screened);
     let misfit = as_read::misfit(&as_read::under_load(&reliable, None, &braid)?);
     if misfit.is_finite() && misfit > 0.0 {
         diagnosis.misfit_rms_N = misfit;
     }
     Ok(diagnosis)
+}
+
+/// The answer where the history names no memory.
+fn without_named_memory(
+    (campaign, screened, reliable): (&Campaign, &Screened<'_>, &Campaign),
+    geometry: &Geometry,
+    options: &Options,
+    found: Found,
+) -> Result<Diagnosis> {
+    let reading = found.slack_reading.as_ref();
+    let mut diagnosis = statically(&corrected(Cow::Borrowed(campaign), reading), geometry, options)?;
+    let others = first_runs::answer_without(
+        &diagnosis,
+        &corrected(Cow::Borrowed(reliable), reading),
+        found.first_runs.as_ref(),
+        geometry,
+        options,
+    )?;
+    if let Some(others) = others {
+        diagnosis = others;
+        report_failures(&mut diagnosis, screened);
+    }
+    enter_needed(&mut diagnosis, found.needed.as_ref(), 1.0);
+    enter_slack_reading(&mut diagnosis, reading, 0.0);
+    diagnosis.history = Some(found.answer);
+    Ok(diagnosis)
+}
+
+/// Failures of sensors in recordings that were freed of them before.
+fn report_failures(diagnosis: &mut Diagnosis, screened: &Screened<'_>) {
+    if let Some(failures) = screened.remark() {
+        diagnosis.remarks.retain(|remark| !matches!(remark, Remark::Screening(_)));
+        diagnosis.remarks.push(Remark::Screening(failures));
+    }
 }
 
 /// The answer of recordings without what the load cell reads of a slack muscle, with that reading.

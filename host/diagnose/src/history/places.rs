@@ -8,6 +8,9 @@ use super::unseen::Unseen;
 use crate::linear::Random;
 use crate::verdict::Region;
 
+/// Number of a run within its mounting, from 1.
+pub(super) const RUN_IN_MOUNTING: &str = "run-in-mounting";
+
 /// The places, the most informative first.
 pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Region> {
     let energy: Vec<f64> = points
@@ -51,7 +54,7 @@ pub(super) fn regions(points: &Points, unseen: &Unseen, since: &[f64]) -> Vec<Re
         };
         let ends = first.iter().map(|r| points.runs[*r].points.1.saturating_sub(1));
         let end = ends.map(|i| since[i]).fold(0.0, f64::max);
-        found.push(region("run-in-mounting", 1.0, 1.0, ""));
+        found.push(region(RUN_IN_MOUNTING, 1.0, 1.0, ""));
         found.push(region("time-since-mounting", 0.0, end, "s"));
     }
     let own = |m: &usize| share(&points.mountings[*m].runs);

@@ -117,6 +117,53 @@ fn the_zero_of_the_load_cell_is_read_of_a_slack_muscle() {
     }
 }
 
+/// Three runs at each of three lengths. In the first run of each the muscle pulls less by `softer` of its force at the highest pressure.
+fn running_in(softer: f64, seed: u64) -> Campaign {
+    let mut random = Random(seed);
+    let muscle = muscle();
+    let ramps = protocol().recordings.swap_remove(0);
+    let highest = ramps.pressure.iter().copied().fold(0.0, f64::max);
+    let runs = [0.0, 4e-3, 8e-3].into_iter().flat_map(|stroke| (1..=3).map(move |run| (stroke, run)));
+    let recordings = runs.map(|(stroke, run)| {
+        let mut r = ramps.clone();
+        let lost = if run == 1 { softer } else { 0.0 };
+        let force = r.pressure.iter().map(|p| {
+            let quasi = muscle.force(Pressure::from_pascals(*p), Length::from_metres(stroke), 0.0).newtons();
+            quasi.max(0.0) * (1.0 - lost * p / highest) + 0.03 * random.normal()
+        });
+        r.force = Some(force.collect());
+        r.stroke.fill(stroke);
+        r.name = format!("{stroke} m, run {run}");
+        r
+    });
+    Campaign::new(recordings.collect())
+}
+
+#[test]
+fn the_search_leaves_out_first_runs_that_alone_differ() {
+    let left_out = |d: &Diagnosis| {
+        d.remarks.iter().find_map(|r| match r {
+            Remark::FirstRuns { left_out, others_agree, .. } => Some((left_out.clone(), *others_agree)),
+            _ => None,
+        })
+    };
+    let ask = |campaign: &Campaign| {
+        history::diagnose(campaign, &geometry(), &Options::default()).expect("an answer")
+    };
+    for seed in 1..=3 {
+        let campaign = running_in(0.04, seed);
+        let d = ask(&campaign);
+        let (names, others_agree) = left_out(&d).unwrap_or_else(|| panic!("{seed}: {:?}", d.remarks));
+        assert_eq!(names, ["0 m, run 1", "0.004 m, run 1", "0.008 m, run 1"]);
+        assert!(others_agree && d.missing.is_empty() && d.verdict() == Verdict::Unexplained, "{d:?}");
+        let place = &d.r#where[0];
+        assert!(place.coordinate == "run-in-mounting" && place.share > 0.9, "{place:?}");
+        assert_eq!(history::without_first_runs(&campaign, &d).recordings.len(), 6);
+        let d = ask(&running_in(0.0, seed));
+        assert!(left_out(&d).is_none() && d.verdict() == Verdict::Consistent, "{seed}: {:?}", d.unexplained);
+    }
+}
+
 /// A length that slips all the time: nothing separates it from slow noise.
 #[test]
 fn an_effect_that_slow_noise_imitates_is_listed_and_not_named() {

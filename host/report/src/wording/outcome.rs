@@ -11,6 +11,12 @@ pub(crate) fn one_bladder_misfits(d: &Diagnosis) -> bool {
     d.remarks.iter().any(|r| matches!(r, Remark::Concealed { .. }))
 }
 
+/// Whether the model agrees with all runs but the first of each mounting.
+#[must_use]
+pub(crate) fn only_first_runs_differ(d: &Diagnosis) -> bool {
+    d.remarks.iter().any(|r| matches!(r, Remark::FirstRuns { others_agree: true, .. }))
+}
+
 /// The judgement in one sentence.
 #[must_use]
 pub fn verdict(d: &Diagnosis) -> String {
@@ -38,6 +44,9 @@ pub fn verdict(d: &Diagnosis) -> String {
         },
         Verdict::PartlyExplained => {
             format!("The model lacks {}. This explains a part of its error above the noise.", list(&names))
+        }
+        Verdict::Unexplained if only_first_runs_differ(d) => {
+            "The model agrees with all runs but the first of each mounting, and no effect of the library explains these.".to_owned()
         }
         Verdict::Unexplained if !d.unconfirmed().is_empty() => {
             "The model lacks something. Effects of the library fit its error, but no better than chance or slow noise could.".to_owned()

@@ -10,6 +10,7 @@ pub fn remark(remark: &Remark) -> String {
     match remark {
         Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
         Remark::StaticMisfit(rms) => static_misfit(*rms),
+        Remark::FirstRuns { left_out, of, others_agree } => first_runs(left_out.len(), *of, *others_agree),
         Remark::BeginsWithinStroke(effect) => begins_within_stroke(effect),
         Remark::BeginsJustFilled(effect) => begins_just_filled(effect),
         Remark::BladderStiffens(effect) => bladder_stiffens(effect),
@@ -194,6 +195,15 @@ fn static_misfit(rms: f64) -> String {
     format!(
         "the static model of all mountings, without the memory, leaves {rms:.2} N rms. Geometry, end effects and mounted lengths (±1 mm by \
          tape measure) are not identifiable from one muscle; diagnose three or more muscles of one type together to identify them"
+    )
+}
+
+fn first_runs(left_out: usize, of: usize, others_agree: bool) -> String {
+    let others = if others_agree { " The model agrees with the other runs." } else { "" };
+    format!(
+        "run 1 of each mounting differs from the runs that follow, and no effect of the library explains it: the muscle may run in.{others} The \
+         search for effects, what could be hidden, the error on held-out rows, and the table that -o writes are without these runs ({left_out} \
+         of {of}). Before a recording, fill the muscle several times at the new length"
     )
 }
 

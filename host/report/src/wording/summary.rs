@@ -8,8 +8,8 @@ use pam_diagnose::verdict::{Diagnosis, Missing, ParameterValue, Pattern, Verdict
 use pam_diagnose::why::Why;
 
 use super::{
-    HiddenEffect, hidden, one_bladder_misfits, pattern, proposal, region, remark, sentence, split,
-    unconfirmed, why, with_interval,
+    HiddenEffect, hidden, one_bladder_misfits, only_first_runs_differ, pattern, proposal, region, remark,
+    sentence, split, unconfirmed, why, with_interval,
 };
 use crate::effect_page::place;
 
@@ -125,6 +125,8 @@ fn header(s: &mut String, d: &Diagnosis) {
             Verdict::Explained => &explained,
             Verdict::PartlyExplained =>
                 "PARTLY EXPLAINED: the effects below explain a part of the model's error above the noise.",
+            Verdict::Unexplained if only_first_runs_differ(d) =>
+                "UNEXPLAINED: the model agrees with all runs but the first of each mounting, and no effect of the library explains these.",
             Verdict::Unexplained if !d.unconfirmed().is_empty() =>
                 "UNEXPLAINED: effects of the library fit the model's error above the noise, but no better than chance or slow noise could.",
             Verdict::Unexplained if matches!(d.unexplained.pattern, Pattern::NotRepeatable(_)) =>
