@@ -59,7 +59,7 @@ pam_data::criteria! {
     MEMORY_LEAST_SHARE: f64 = 0.1, "c_min", "1", Measured("largest of 144 nulls 0.040; below what filled rubbers relax");
     /// First runs differ from all later ones by chance in one of as many ways as there are to choose them: at least this many.
     FIRST_RUN_WAYS: f64 = 20.0, "1/p_first", "1", Convention("p = 5 %");
-    /// A muscle runs in if its first runs differ from the second by this many times what later runs differ by: creep goes on.
+    /// A muscle runs in if its first runs differ from the second by this many times what later runs differ by: creep continues.
     FIRST_RUN_APART: f64 = 3.0, "r_first", "1", Derived("creep with the logarithm of time gives at most ln 3 / ln(5/3) = 2.15 between runs of equal length");
     /// Least share of the squared unseen error that the memory must remove.
     LEAST_GAIN: f64 = 0.15, "g_min", "1", Measured("largest of 60 nulls with ten runs 0.10");

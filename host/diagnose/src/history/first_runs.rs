@@ -28,7 +28,7 @@ pub(super) struct FirstRuns {
     recordings: Vec<usize>,
     /// Probability of such differences by chance.
     chance: f64,
-    /// Whether later runs exclude that the muscle or a reading goes on changing.
+    /// Whether later runs exclude a change that continues.
     once: bool,
 }
 
