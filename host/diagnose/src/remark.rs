@@ -109,9 +109,9 @@ pub enum Remark {
     StaticMisfit(f64),
     /// The first runs of the mountings differ from those that follow, and no effect explains it: they were left out of the search.
     FirstRuns {
-        /// Their recordings.
-        left_out: Vec<String>,
-        /// Of how many runs.
+        /// How many runs.
+        left_out: usize,
+        /// Of how many.
         of: usize,
         /// Whether the model agrees with the other runs.
         others_agree: bool,

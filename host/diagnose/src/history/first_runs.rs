@@ -24,8 +24,6 @@ use crate::verdict::{Diagnosis, Missing, Outcome, Pattern, Region, Verdict};
 /// First runs that differ from those that follow.
 #[derive(Clone, Debug)]
 pub(super) struct FirstRuns {
-    /// Their recordings, ascending.
-    recordings: Vec<usize>,
     /// Probability of such differences by chance.
     chance: f64,
     /// Whether later runs exclude a change that continues.
@@ -51,9 +49,7 @@ impl FirstRuns {
             let contrast = Contrast::of(&first).filter(|c| c.half.is_some_and(|half| c.mean.abs() > half))?;
             contrast.chance()
         };
-        let mut recordings: Vec<usize> = several().map(|runs| points.runs[runs[0]].recording).collect();
-        recordings.sort_unstable();
-        Some(Self { recordings, chance, once })
+        Some(Self { chance, once })
     }
 }
 
@@ -73,16 +69,13 @@ pub(super) fn answer_without(
     geometry: &Geometry,
     options: &Options,
 ) -> Result<Option<Diagnosis>> {
-    let Some(FirstRuns { recordings, chance, once }) = first_runs else { return Ok(None) };
+    let Some(FirstRuns { chance, once }) = first_runs else { return Ok(None) };
     let settled = !all.judged() || all.verdict() == Verdict::Consistent;
     let is_cause = |m: &Missing| !once || may_differ_in_first_runs(&m.effect);
     if settled || all.missing.iter().any(is_cause) {
         return Ok(None);
     }
-    let is_first = |i: usize| recordings.binary_search(&i).is_ok();
-    let (first, others): (Vec<_>, Vec<_>) =
-        campaign.recordings.iter().cloned().enumerate().partition(|(i, _)| is_first(*i));
-    let others = Campaign { recordings: others.into_iter().map(|(_, r)| r).collect(), ..campaign.clone() };
+    let others = others(campaign);
     let mut answer = statically(&others, geometry, options)?;
     if !answer.judged() {
         return Ok(None);
@@ -103,7 +96,7 @@ pub(super) fn answer_without(
         recordings: Vec::new(),
     };
     let remark = Remark::FirstRuns {
-        left_out: first.into_iter().map(|(_, r)| r.name).collect(),
+        left_out: campaign.recordings.len() - others.recordings.len(),
         of: campaign.recordings.len(),
         others_agree: answer.verdict() == Verdict::Consistent,
     };
@@ -148,14 +141,21 @@ fn enter(answer: &mut Diagnosis, all: &Diagnosis, region: Region) {
     (answer.misfit_rms_N, answer.samples) = (all.misfit_rms_N, all.samples);
 }
 
-/// The recordings that an answer is about without first runs that it leaves out.
+/// The recordings without the first of each mounting that has several.
+fn others(campaign: &Campaign) -> Campaign {
+    let mountings = campaign.mountings().unwrap_or_default();
+    let begins = |i: usize| i == 0 || mountings[i] != mountings[i - 1];
+    let continues = |i: usize| mountings.get(i + 1) == Some(&mountings[i]);
+    let kept = |i: usize| mountings.is_empty() || !(begins(i) && continues(i));
+    let recordings = campaign.recordings.iter().enumerate().filter(|(i, _)| kept(*i));
+    Campaign { recordings: recordings.map(|(_, r)| r.clone()).collect(), ..campaign.clone() }
+}
+
+/// The recordings that an answer is about, without first runs that it leaves out.
 pub(crate) fn without_first_runs<'a>(campaign: &'a Campaign, answer: &Diagnosis) -> Cow<'a, Campaign> {
-    let left_out = answer.remarks.iter().find_map(|r| match r {
-        Remark::FirstRuns { left_out, .. } => Some(left_out),
-        _ => None,
-    });
-    let Some(left_out) = left_out else { return Cow::Borrowed(campaign) };
-    let mut kept = campaign.clone();
-    kept.recordings.retain(|r| !left_out.contains(&r.name));
-    Cow::Owned(kept)
+    if answer.remarks.iter().any(|r| matches!(r, Remark::FirstRuns { .. })) {
+        Cow::Owned(others(&super::reliable_recordings(campaign)))
+    } else {
+        Cow::Borrowed(campaign)
+    }
 }

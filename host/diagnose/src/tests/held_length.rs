@@ -143,7 +143,7 @@ fn running_in(softer: f64, seed: u64) -> Campaign {
 fn the_search_leaves_out_first_runs_that_alone_differ() {
     let left_out = |d: &Diagnosis| {
         d.remarks.iter().find_map(|r| match r {
-            Remark::FirstRuns { left_out, others_agree, .. } => Some((left_out.clone(), *others_agree)),
+            Remark::FirstRuns { left_out, others_agree, .. } => Some((*left_out, *others_agree)),
             _ => None,
         })
     };
@@ -153,12 +153,15 @@ fn the_search_leaves_out_first_runs_that_alone_differ() {
     for seed in 1..=3 {
         let campaign = running_in(0.04, seed);
         let d = ask(&campaign);
-        let (names, others_agree) = left_out(&d).unwrap_or_else(|| panic!("{seed}: {:?}", d.remarks));
-        assert_eq!(names, ["0 m, run 1", "0.004 m, run 1", "0.008 m, run 1"]);
-        assert!(others_agree && d.missing.is_empty() && d.verdict() == Verdict::Unexplained, "{d:?}");
+        let (runs, others_agree) = left_out(&d).unwrap_or_else(|| panic!("{seed}: {:?}", d.remarks));
+        assert!(
+            runs == 3 && others_agree && d.missing.is_empty() && d.verdict() == Verdict::Unexplained,
+            "{d:?}"
+        );
         let place = &d.r#where[0];
         assert!(place.coordinate == "run-in-mounting" && place.share > 0.9, "{place:?}");
-        assert_eq!(history::without_first_runs(&campaign, &d).recordings.len(), 6);
+        let others = history::without_first_runs(&campaign, &d);
+        assert!(others.recordings.len() == 6 && others.recordings.iter().all(|r| !r.name.contains("run 1")));
         let d = ask(&running_in(0.0, seed));
         assert!(left_out(&d).is_none() && d.verdict() == Verdict::Consistent, "{seed}: {:?}", d.unexplained);
     }

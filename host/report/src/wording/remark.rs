@@ -10,7 +10,7 @@ pub fn remark(remark: &Remark) -> String {
     match remark {
         Remark::NotJudged(reason) => format!("not judged: {}", unjudgeable(reason)),
         Remark::StaticMisfit(rms) => static_misfit(*rms),
-        Remark::FirstRuns { left_out, of, others_agree } => first_runs(left_out.len(), *of, *others_agree),
+        Remark::FirstRuns { left_out, of, others_agree } => first_runs(*left_out, *of, *others_agree),
         Remark::BeginsWithinStroke(effect) => begins_within_stroke(effect),
         Remark::BeginsJustFilled(effect) => begins_just_filled(effect),
         Remark::BladderStiffens(effect) => bladder_stiffens(effect),
