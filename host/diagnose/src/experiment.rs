@@ -18,6 +18,14 @@ pub enum Motion {
     Rest,
 }
 
+impl Motion {
+    /// Whether a rig can do it that only holds the length.
+    #[must_use]
+    pub(crate) fn holds_the_length(self) -> bool {
+        self == Self::PressureRamps
+    }
+}
+
 /// Why an experiment is proposed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Proposal {

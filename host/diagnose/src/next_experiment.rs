@@ -15,6 +15,7 @@ use super::history::is_from_history;
 use super::isolability::tables;
 use super::linear::{add_scaled, energy};
 use super::protocol_simulation::{moments, play};
+use super::remark::Remark;
 use super::verdict::{Diagnosis, Missing, NextExperiment};
 use pam_data::error::Result;
 use pam_fit::bench::Candidate;
@@ -116,11 +117,18 @@ pub fn next_experiment(
             Some((least / item.minutes.sqrt(), least, text, item.motion))
         })
         .collect();
-    let best = tried.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+    let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
+    // A rig that held the length throughout may be able to do nothing else.
+    let held = diagnosis.remarks.contains(&Remark::HeldLength);
+    let preferred =
+        |difference: f64, motion: Motion| held && motion.holds_the_length() && difference >= floor;
+    let best = tried
+        .into_iter()
+        .flatten()
+        .max_by(|a, b| preferred(a.1, a.3).cmp(&preferred(b.1, b.3)).then(a.0.total_cmp(&b.0)));
     let mut separates = vec![open.effect];
     separates.extend(open.others);
     Ok(best.map(|(_, difference, protocol, motion)| {
-        let floor = WORTHWHILE_DIFFERENCE * diagnosis.noise_N.max(EXPECTED_NOISE * diagnosis.blocked_force_N);
         let check = bench_check(&separates);
         let proposal = Proposal { motion, check, motion_separates: check.is_none() || !(difference < floor) };
         NextExperiment { separates, protocol, expected_difference_N: difference, proposal }

@@ -173,10 +173,11 @@ fn recommendation(d: &Diagnosis) -> Section {
         );
     }
     if let Some(n) = &d.next_experiment {
-        steps.push(format!(
-            "Record the next experiment: {}",
-            wording::sentence(&wording::proposal(&n.proposal))
-        ));
+        let proposal = wording::sentence(&wording::proposal(&n.proposal));
+        steps.push(match n.proposal.motion_separates {
+            true => format!("Record the next experiment: {proposal}"),
+            false => proposal,
+        });
     }
     if !bench.is_empty() {
         steps.push(format!(

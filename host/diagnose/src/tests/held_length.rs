@@ -2,6 +2,10 @@
 //! range of pressures. Here each strand is a play of its own, not a set of bristles as in the diagnosis.
 
 use super::*;
+use crate::experiment::Motion;
+use crate::next_experiment::next_experiment;
+use crate::verdict::{Outcome, Unconfirmed};
+use pam_fit::bench::Candidate;
 
 /// Ramps of the pressure at rest length, and a staircase that begins at the highest pressure.
 fn protocol() -> Campaign {
@@ -182,4 +186,26 @@ fn an_effect_that_slow_noise_imitates_is_listed_and_not_named() {
     let unconfirmed = d.unconfirmed();
     assert!(unconfirmed.iter().any(|u| u.effect == "end-slip"), "{unconfirmed:?}");
     assert!(unconfirmed.iter().all(|u| u.share >= 0.5) && unconfirmed.len() <= 4, "{unconfirmed:?}");
+}
+
+#[test]
+fn a_rig_that_held_the_length_is_proposed_ramps_where_they_separate() {
+    let like = |effect: &str| {
+        let law = Candidate::from_name(effect).expect("an effect");
+        let parameters = law.info().parameters.iter().map(|p| 0.5 * (p.low + p.high)).collect();
+        Unconfirmed { effect: effect.into(), share: 0.8, parameters }
+    };
+    let mut d = ask(&recorded_with_strands(30e3, 0.0, 1));
+    d.outcome = Outcome::Judged(Verdict::Unexplained);
+    d.unexplained.unconfirmed = ["coulomb-friction", "presliding-hysteresis"].map(like).to_vec();
+    let next = |d: &Diagnosis| {
+        let next = next_experiment(d, &muscle(), 150e3, 550e3).expect("playable").expect("a proposal");
+        (next.proposal.motion, next.expected_difference_N)
+    };
+    let moving = Diagnosis { remarks: Vec::new(), ..d.clone() };
+    let (held, free) = (next(&d), next(&moving));
+    assert!(held.0 == Motion::PressureRamps && free.0 == Motion::Speeds, "{held:?} {free:?}");
+    // What they separate less than the noise is left to a rig that moves.
+    let noisy = Diagnosis { noise_N: 10.0 * held.1, ..d };
+    assert_eq!(next(&noisy).0, Motion::Speeds);
 }

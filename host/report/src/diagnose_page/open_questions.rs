@@ -52,13 +52,17 @@ pub(super) fn next(d: &Diagnosis) -> Section {
     let mut section = Section::new("Next experiment").summarised();
     if let Some(n) = &d.next_experiment {
         let separates: Vec<String> = n.separates.iter().map(|s| format!("`{s}`")).collect();
-        section.text(format!(
-            "{} It separates {} by up to {} N.",
-            wording::sentence(&wording::proposal(&n.proposal)),
-            separates.join(" and "),
-            significant(n.expected_difference_N, 2)
-        ));
-        if !n.protocol.is_empty() {
+        let (proposal, separates) =
+            (wording::sentence(&wording::proposal(&n.proposal)), separates.join(" and "));
+        section.text(if n.proposal.motion_separates {
+            format!(
+                "{proposal} It separates {separates} by up to {} N.",
+                significant(n.expected_difference_N, 2)
+            )
+        } else {
+            format!("{proposal} This separates {separates}.")
+        });
+        if n.proposal.motion_separates && !n.protocol.is_empty() {
             section.listing(n.protocol.clone());
         }
     } else if d.judged() && d.verdict() == Verdict::Consistent {

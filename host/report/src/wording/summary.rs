@@ -66,12 +66,12 @@ pub fn summary(d: &Diagnosis) -> String {
         }
     }
     if let Some(n) = &d.next_experiment {
-        let _ = writeln!(
-            s,
-            "\nNext experiment: {} (expected difference {:.2} N)",
-            proposal(&n.proposal),
-            n.expected_difference_N
-        );
+        let _ = write!(s, "\nNext experiment: {}", proposal(&n.proposal));
+        // What no motion separates has no difference to expect.
+        if n.proposal.motion_separates {
+            let _ = write!(s, " (expected difference {:.2} N)", n.expected_difference_N);
+        }
+        s.push('\n');
     }
     if d.noise_N > 0.0 {
         could_be_hidden(&mut s, d);
