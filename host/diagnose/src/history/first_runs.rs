@@ -31,23 +31,25 @@ pub(super) struct FirstRuns {
 }
 
 impl FirstRuns {
-    /// The first runs of a campaign where their filling differs from the second by more than later ones differ from each other; with two
-    /// runs at each length, where it differs by as much at all lengths.
+    /// The first runs of a campaign where their filling differs from the second by more than later ones differ from each other, and chance
+    /// seldom does so: by rank, or because it differs by as much at all lengths. With two runs at each length, the last alone counts.
     pub(super) fn of(points: &Points, visits: &Visits) -> Option<Self> {
         let several = || points.mountings.iter().map(|m| &m.runs[..]).filter(|runs| runs.len() > 1);
         let between = |run: &[usize]| Some(visits.filled(run[1], run[0])).filter(|d| d.is_finite());
         let first: Vec<f64> = several().filter_map(|runs| between(&runs[..2])).collect();
         let later: Vec<f64> = several().flat_map(|runs| runs[1..].windows(2).filter_map(between)).collect();
         let once = !later.is_empty();
+        let constant = Contrast::of(&first).filter(|c| c.half.is_some_and(|half| c.mean.abs() > half));
+        let constant = constant.map(|c| c.chance());
         let chance = if once {
             let least = first.iter().map(|d| d.abs()).fold(f64::INFINITY, f64::min);
             let above = later.iter().all(|d| d.abs() < least);
             let apart = root_mean_square(&first) >= FIRST_RUN_APART * root_mean_square(&later);
             let ways = findings::ways(first.len(), later.len());
-            (above && apart && ways >= FIRST_RUN_WAYS).then(|| 1.0 / ways)?
+            let by_rank = (ways >= FIRST_RUN_WAYS).then(|| 1.0 / ways);
+            constant.into_iter().chain(by_rank).reduce(f64::min).filter(|_| above && apart)?
         } else {
-            let contrast = Contrast::of(&first).filter(|c| c.half.is_some_and(|half| c.mean.abs() > half))?;
-            contrast.chance()
+            constant?
         };
         Some(Self { chance, once })
     }
