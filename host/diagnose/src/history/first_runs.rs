@@ -31,8 +31,8 @@ pub(super) struct FirstRuns {
 }
 
 impl FirstRuns {
-    /// The first runs of a campaign where their filling differs from the second by more than later ones differ from each other, which chance
-    /// makes improbable by rank, or because it differs by as much at all lengths. With two runs at each length, the last alone counts.
+    /// The first runs of a campaign where their filling differs from the second by more than later ones differ from each other. Chance must
+    /// be improbable by rank, or because the difference is the same at all lengths; with two runs at each length, the last alone counts.
     pub(super) fn of(points: &Points, visits: &Visits) -> Option<Self> {
         let several = || points.mountings.iter().map(|m| &m.runs[..]).filter(|runs| runs.len() > 1);
         let between = |run: &[usize]| Some(visits.filled(run[1], run[0])).filter(|d| d.is_finite());
