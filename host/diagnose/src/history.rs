@@ -84,7 +84,7 @@ pub(super) struct Found {
     pub answer: History,
     /// Where the static error of held-out runs is concentrated.
     pub regions: Vec<Region>,
-    /// First runs that differ from those that follow.
+    /// First runs that differ from those that follow, where no memory is named.
     first_runs: Option<FirstRuns>,
     /// By recording: times, s, and shifts of pressure, Pa.
     pub shifts: Vec<(Vec<f64>, Vec<f64>)>,
@@ -163,10 +163,12 @@ pub(super) fn found(campaign: &Campaign, geometry: &Geometry) -> Option<Found> {
         })
         .collect();
     let regions = places::regions(points, &fits.by_direction, &fits.layer.clocks[law.choice.pause].1.since);
+    // A named memory explains what first runs differ by.
+    let first_runs = if answer.named { None } else { FirstRuns::of(points, &Visits::new(points)) };
     Some(Found {
         answer,
         regions,
-        first_runs: FirstRuns::of(points, &Visits::new(points)),
+        first_runs,
         shifts,
         peak,
         needed: fits.needed.clone(),

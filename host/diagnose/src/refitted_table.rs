@@ -36,7 +36,8 @@ pub struct Refitted {
 }
 
 /// Refits the table beside the named effects. They are kept only where the recordings are then predicted better, or about as well
-/// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case. First runs that the diagnosis leaves out are left out.
+/// and a pressure left out of the fit no worse: a table must not get worse by a diagnosis. What the user gave is kept in any case.
+/// First runs that the diagnosis leaves out are left out.
 ///
 /// # Errors
 /// Recordings that cannot be fitted.

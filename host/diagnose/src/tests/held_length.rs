@@ -100,13 +100,15 @@ pub(crate) fn at_three_lengths(zero: f64, seed: u64) -> Campaign {
     Campaign::new(recordings.to_vec())
 }
 
+/// The answer with the history of the campaign.
+fn ask_with_history(campaign: &Campaign) -> Diagnosis {
+    history::diagnose(campaign, &geometry(), &Options::default()).expect("an answer")
+}
+
 #[test]
 fn the_zero_of_the_load_cell_is_read_of_a_slack_muscle() {
-    let ask = |campaign: &Campaign| {
-        history::diagnose(campaign, &geometry(), &Options::default()).expect("an answer")
-    };
     for (zero, seed) in [(0.0, 1), (8.0, 2), (-8.0, 3)] {
-        let d = ask(&at_three_lengths(zero, seed));
+        let d = ask_with_history(&at_three_lengths(zero, seed));
         let found = d.missing.iter().find(|m| m.effect == "force-offset");
         if zero == 0.0 {
             assert!(d.missing.is_empty(), "{:?}", names(&d));
@@ -151,12 +153,9 @@ fn the_search_leaves_out_first_runs_that_alone_differ() {
             _ => None,
         })
     };
-    let ask = |campaign: &Campaign| {
-        history::diagnose(campaign, &geometry(), &Options::default()).expect("an answer")
-    };
     for seed in 1..=3 {
         let campaign = running_in(0.04, seed);
-        let d = ask(&campaign);
+        let d = ask_with_history(&campaign);
         let (runs, others_agree) = left_out(&d).unwrap_or_else(|| panic!("{seed}: {:?}", d.remarks));
         assert!(
             runs == 3 && others_agree && d.missing.is_empty() && d.verdict() == Verdict::Unexplained,
@@ -166,7 +165,7 @@ fn the_search_leaves_out_first_runs_that_alone_differ() {
         assert!(place.coordinate == "run-in-mounting" && place.share > 0.9, "{place:?}");
         let others = history::without_first_runs(&campaign, &d);
         assert!(others.recordings.len() == 6 && others.recordings.iter().all(|r| !r.name.contains("run 1")));
-        let d = ask(&running_in(0.0, seed));
+        let d = ask_with_history(&running_in(0.0, seed));
         assert!(left_out(&d).is_none() && d.verdict() == Verdict::Consistent, "{seed}: {:?}", d.unexplained);
     }
 }
